@@ -1,0 +1,5 @@
+"""gliderwatch: watches a glider dockserver and alerts the pilot when a glider flies abnormally."""
+
+from importlib.metadata import version
+
+__version__ = version("gliderwatch")

@@ -1,0 +1,28 @@
+"""One root of errors, branched by what the caller does about them."""
+
+
+class GliderwatchError(Exception):
+    """Everything gliderwatch raises on purpose; its text is fit for a user."""
+
+
+class Retry(GliderwatchError):
+    """The input may be good later (a missing cache file, a share that is away): wait and try again."""
+
+
+class MissingCache(Retry):
+    """A file with a factored header whose sensor list (cache file) is not there yet.
+
+    ``crc`` is the checksum that names the cache file, lower case, without a suffix.
+    """
+
+    def __init__(self, crc: str) -> None:
+        super().__init__(f"cache file {crc}.cac is missing")
+        self.crc = crc
+
+
+class Quarantine(GliderwatchError):
+    """The input will never be good as it is: note the reason, leave the file alone, go on."""
+
+
+class ConfigError(GliderwatchError):
+    """The configuration is wrong; the text names the file, the line and the cure."""

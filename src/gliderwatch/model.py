@@ -1,0 +1,249 @@
+"""The values that flow through gliderwatch. Pure: no I/O, no clock, no globals.
+
+Units are SI, times are seconds since 1970-01-01T00:00:00Z, latitudes and longitudes degrees
+north and east, angles radians. Velocities are (east, north) relative to true north. The one
+exception is `Segment`, whose headings and currents are as the glider reports them, relative to
+magnetic north, with the declination beside them: a segment may not hold the position that the
+declination depends on, so that `navigation.frame` rotates them once it is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum, StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def readonly(values: object) -> Array:
+    """A read-only float64 array of `values`, so that a value that flows cannot be changed."""
+    array = np.array(values, dtype=np.float64)
+    array.flags.writeable = False
+    return array
+
+
+# --------------------------------------------------------------------------- input
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class SegmentId:
+    """Identity of a segment, from its header and never from its file name.
+
+    Sorting gives the order of time: by the glider's clock at the opening of the file, then by
+    name. ``name`` is the full name in the header (`electa-2022-308-3-2`).
+    """
+
+    opened_at: float
+    glider: str
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """Samples of one quantity: times ``t`` (s, shape (n,), increasing) and values ``v`` (shape (n,))."""
+
+    t: Array
+    v: Array
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def between(self, start: float, end: float) -> Series:
+        """The samples with start <= t <= end."""
+        i, j = np.searchsorted(self.t, start, "left"), np.searchsorted(self.t, end, "right")
+        return Series(self.t[i:j], self.v[i:j])
+
+
+EMPTY = Series(readonly([]), readonly([]))
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """One decoded file: what a glider sent of one segment.
+
+    ``quantities`` maps names of `docs/nomenclature.md` (``fix_lat``, ``heading``, ``depth``, ...)
+    to samples; a quantity the file does not hold is absent. ``completeness`` orders copies of
+    one segment: the greater replaces the smaller. ``dropped`` counts values out of physical
+    range per quantity. ``declination`` is the angle from true to magnetic north (rad, east
+    positive), None where neither the file nor a position in it tells.
+    """
+
+    id: SegmentId
+    mission: str
+    kind: str
+    last_t: float
+    completeness: tuple[int, int, str]
+    quantities: Mapping[str, Series]
+    declination: float | None = None
+    declination_source: str = ""
+    dropped: Mapping[str, int] = field(default_factory=dict)
+
+    def get(self, name: str) -> Series:
+        """The samples of a quantity, empty where the file has none."""
+        return self.quantities.get(name, EMPTY)
+
+
+# --------------------------------------------------------------------------- navigation
+
+
+@dataclass(frozen=True, slots=True)
+class Fix:
+    """A satellite position: time (s), latitude and longitude (degrees)."""
+
+    t: float
+    lat: float
+    lon: float
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """The way of a dive in its own plane, origin at the fix before it, and the heading along it.
+
+    ``t`` (s), ``x`` (m, shape (n, 2): east, north) and ``heading`` (unit vectors east, north;
+    shape (n-1, 2)) that holds between t[i] and t[i+1]; a row of zeros where the glider was at
+    the surface, not flying.
+    """
+
+    t: Array
+    x: Array
+    heading: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Current:
+    """The depth-averaged current of a dive: east, north (m/s, true north); ``final`` once corrected."""
+
+    u: float
+    v: float
+    final: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Dive:
+    """What happened between the fix before and the fix after one dive.
+
+    ``reason`` is empty when the dive can be used for estimation; otherwise it says in words why
+    not ("no fix", "no heading", "data missing"), and ``track`` is None. ``evidence`` holds
+    numbers that speak for or against a fault (`docs/nomenclature.md`), None-free.
+    """
+
+    glider: str
+    segment: str
+    t_dive: float
+    t_surface: float
+    start: Fix | None
+    end: Fix | None
+    track: Track | None
+    current: Current | None
+    reason: str
+    n_samples: int
+    evidence: Mapping[str, float]
+    notes: tuple[str, ...] = ()
+
+
+# --------------------------------------------------------------------------- results
+
+
+class Flag(IntEnum):
+    """Result of Algorithm 2 (001)."""
+
+    NORMAL = 0
+    ANOMALY = 1
+    FALSE_ALARM = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Assessment:
+    """What gliderwatch says of one dive. Fields: `docs/nomenclature.md`."""
+
+    glider: str
+    segment: str
+    t_dive: float
+    t_surface: float
+    lat: float | None
+    lon: float | None
+    flag: int | None
+    reason: str
+    speed: float | None
+    speed_min: float
+    speed_max: float
+    flow_u: float | None
+    flow_v: float | None
+    reference_u: float | None
+    reference_v: float | None
+    reference_final: bool
+    p_e: float | None
+    gamma_f: float
+    clle_max: float | None
+    excitation: float | None
+    n_samples: int
+    evidence: Mapping[str, float]
+    notes: tuple[str, ...]
+    parameters: str
+
+
+class Severity(IntEnum):
+    """How loud a message is; recipients choose the least they want."""
+
+    INFO = 0
+    WARNING = 1
+    CRITICAL = 2
+
+
+class Kind(StrEnum):
+    """What a message is about."""
+
+    ANOMALY = "anomaly"
+    FALSE_ALARM = "false_alarm"
+    ALL_CLEAR = "all_clear"
+    REMINDER = "reminder"
+    CORRECTION = "correction"
+    SURFACING = "surfacing"
+    OPERATOR = "operator"
+
+
+@dataclass(frozen=True, slots=True)
+class Incident:
+    """Flagged dives in a row, as the data known now tell it.
+
+    ``id`` is made of glider, kind and the first flagged dive, so that the same data give the same id
+    in any order of arrival. ``since`` is the start of the first flagged dive, ``opened_at`` the
+    surfacing that opened it, ``cleared_at`` the one that cleared it (None: open). ``worst`` is
+    the dive furthest out of range, ``last`` the latest flagged dive.
+    """
+
+    id: str
+    glider: str
+    kind: Kind
+    severity: Severity
+    since: float
+    opened_at: float
+    cleared_at: float | None
+    dives: int
+    worst: Assessment
+    last: Assessment
+
+
+@dataclass(frozen=True, slots=True)
+class Alert:
+    """One message to people. ``id`` is unique and stable: an alert of the same id is never made twice.
+
+    ``incident`` names the thread (empty for surfacing notices and operator messages), ``time`` is the
+    surfacing that caused it, ``audience`` the severity that decides who gets it (an all-clear
+    goes to whoever got the alarm).
+    """
+
+    id: str
+    glider: str
+    time: float
+    kind: Kind
+    severity: Severity
+    audience: Severity
+    incident: str
+    title: str
+    body: str
+    html: str
