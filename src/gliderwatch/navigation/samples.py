@@ -1,0 +1,123 @@
+"""The samples of a segment as navigation needs them: thinned, and relative to true north. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gliderwatch.model import EMPTY, Array, Segment, Series, readonly
+from gliderwatch.navigation.frame import heading_vectors, magnetic_to_true
+
+Samples = Mapping[str, Series]
+
+SPACING = 30.0
+"""Seconds: finer samples are averaged to this. A glider turns and pitches in minutes, and a
+checkpoint that carries a dive on to the next segment stays small also for 4 s data."""
+
+_KEPT = ("pitch", "roll", "depth", "depth_rate", "speed_onboard", "thruster_power", "dr_time")
+_CURRENTS = {"current": ("current_x", "current_y"), "current_final": ("current_final_x", "current_final_y")}
+_EXACT = ("fix_", "current_", "dr_", "waypoint_")
+"""Beginnings of the names of quantities whose single values matter: never averaged."""
+
+
+def compact(quantities: Mapping[str, Series]) -> dict[str, Series]:
+    """The quantities of a segment with samples finer than `SPACING` averaged.
+
+    Angles of compass are averaged as vectors; of dead-reckoned positions one in each bin is kept, fixes
+    and currents stay whole.
+    """
+    out = {}
+    for name, series in quantities.items():
+        starts = _bins(series.t)
+        if name.startswith(("fix_", "current_")) or len(starts) == len(series):
+            out[name] = series
+        elif name.startswith(_EXACT):
+            out[name] = Series(readonly(series.t[starts]), readonly(series.v[starts]))
+        elif name.startswith("heading"):
+            mean = _mean(np.exp(1j * series.v), starts)
+            out[name] = Series(readonly(_mean(series.t, starts)), readonly(np.angle(mean) % (2 * np.pi)))
+        else:
+            out[name] = Series(readonly(_mean(series.t, starts)), readonly(_mean(series.v, starts)))
+    return out
+
+
+def _bins(t: Array) -> NDArray[np.intp]:
+    """Index of the first sample in each bin of `SPACING` seconds that holds any."""
+    bins = np.floor(t / SPACING)
+    return np.flatnonzero(np.concatenate([[True], bins[1:] != bins[:-1]])) if len(t) else np.empty(0, np.intp)
+
+
+def _mean(values: NDArray[Any], starts: NDArray[np.intp]) -> NDArray[Any]:
+    counts = np.diff(np.append(starts, len(values)))
+    return np.asarray(np.add.reduceat(values, starts) / counts)
+
+
+def joined(a: Series, b: Series) -> tuple[Array, Array, Array]:
+    """Times at which both series have a value, and the two values there."""
+    if len(a) == len(b) and np.array_equal(a.t, b.t):
+        return a.t, a.v, b.v
+    t, i, j = np.intersect1d(a.t, b.t, return_indices=True)
+    return t, a.v[i], b.v[j]
+
+
+def prepare(segment: Segment, declination: float) -> Samples:
+    """What navigation needs of a segment; vectors relative to true north by `declination` (rad).
+
+    Keys: ``fix_lat, fix_lon, dr_lat, dr_lon`` (degrees), ``heading_e, heading_n`` (unit vectors;
+    the commanded heading where the measured one is absent), ``current_e, current_n,
+    current_final_e, current_final_n`` (m/s), ``pitch, roll`` (rad), ``depth`` (m), ``depth_rate,
+    speed_onboard`` (m/s), ``dr_time`` (s).
+    """
+    out = {name: segment.quantities[name] for name in _KEPT if name in segment.quantities}
+    for pair in (("dr_lat", "dr_lon"), ("fix_lat", "fix_lon")):
+        t, lat, lon = joined(segment.get(pair[0]), segment.get(pair[1]))
+        _add(out, pair, t, np.stack([lat, lon], axis=-1))
+    heading = segment.get("heading")
+    if not len(heading):
+        heading = segment.get("heading_commanded")
+    _add(
+        out, ("heading_e", "heading_n"), heading.t, magnetic_to_true(heading_vectors(heading.v), declination)
+    )
+    for name, (x, y) in _CURRENTS.items():
+        t, east, north = joined(segment.get(x), segment.get(y))
+        _add(out, (f"{name}_e", f"{name}_n"), t, magnetic_to_true(np.stack([east, north], -1), declination))
+    return MappingProxyType(out)
+
+
+def _add(out: dict[str, Series], names: tuple[str, str], t: Array, vectors: Array) -> None:
+    if len(t):
+        for i, name in enumerate(names):
+            out[name] = Series(readonly(t), readonly(vectors[:, i]))
+
+
+def concatenated(first: Samples, second: Samples) -> Samples:
+    """The samples of both, in order of time; where they overlap in time both are kept."""
+    out = dict(first)
+    for name, series in second.items():
+        before = out.get(name)
+        if before is None or not len(before):
+            out[name] = series
+            continue
+        t, v = np.concatenate([before.t, series.t]), np.concatenate([before.v, series.v])
+        order = np.argsort(t, kind="stable")
+        out[name] = Series(readonly(t[order]), readonly(v[order]))
+    return MappingProxyType(out)
+
+
+def after(samples: Samples, t: float) -> Samples:
+    """The samples later than `t` (s)."""
+    out = {}
+    for name, series in samples.items():
+        i = int(np.searchsorted(series.t, t, "right"))
+        if i < len(series):
+            out[name] = Series(series.t[i:], series.v[i:])
+    return MappingProxyType(out)
+
+
+def get(samples: Samples, name: str) -> Series:
+    """The samples of one quantity, empty where there are none."""
+    return samples.get(name, EMPTY)

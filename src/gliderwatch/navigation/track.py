@@ -1,0 +1,144 @@
+"""The way of a dive and the numbers that speak for or against a fault. Pure."""
+
+from __future__ import annotations
+
+from math import atan2, degrees
+
+import numpy as np
+
+from gliderwatch.model import Array, Current, Fix, Series, Track, readonly
+from gliderwatch.navigation.flight import SPARSE, Flight
+from gliderwatch.navigation.frame import to_plane
+from gliderwatch.navigation.samples import Samples, get
+
+NOMINAL_SPEED = 0.3
+"""m/s: shapes a track where the glider reports no speed; the fixes correct its length."""
+CIRCLING = 0.1
+"""Length of the mean heading vector below which a mean direction means nothing."""
+
+
+def build_track(samples: Samples, flight: Flight, start: Fix, end: Fix) -> Track:
+    """The dead-reckoned track from fix to fix, the misfit spread linearly in time.
+
+    The glider's own dead-reckoned positions give the shape where they cover the flight, otherwise its
+    heading and speed. At the surface before and after the flight the track drifts with the misfit
+    alone and has no heading.
+    """
+    heading = get(samples, "heading_e").between(flight.start, flight.end)
+    inner = np.unique(np.concatenate([[flight.start, flight.end], heading.t]))
+    t = np.unique(np.concatenate([[start.t], inner[(inner > start.t) & (inner < end.t)], [end.t]]))
+    vectors = _headings(samples, t, flight)
+    reckoned = _onboard(samples, t, flight, start)
+    if reckoned is None:
+        steps = vectors * np.diff(t)[:, None] * _speed(samples, flight)
+        reckoned = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+    misfit = to_plane(end.lat, end.lon, start.lat, start.lon) - reckoned[-1]
+    x = reckoned + misfit * ((t - start.t) / (end.t - start.t))[:, None]
+    return Track(readonly(t), readonly(x), readonly(vectors))
+
+
+def _headings(samples: Samples, t: Array, flight: Flight) -> Array:
+    """Unit vectors between successive times of `t`, zero outside the flight."""
+    middle = (t[1:] + t[:-1]) / 2
+    e, n = get(samples, "heading_e").between(flight.start, flight.end), get(samples, "heading_n")
+    n = n.between(flight.start, flight.end)
+    vectors = np.stack([np.interp(middle, e.t, e.v), np.interp(middle, n.t, n.v)], axis=-1)
+    length = np.hypot(vectors[:, 0], vectors[:, 1])
+    flying = (middle >= flight.start) & (middle <= flight.end) & (length > 1e-6)
+    return np.asarray(np.where(flying[:, None], vectors / np.maximum(length, 1e-6)[:, None], 0.0))
+
+
+def _speed(samples: Samples, flight: Flight) -> float:
+    speed = get(samples, "speed_onboard").between(flight.start, flight.end)
+    return float(np.mean(speed.v)) if len(speed) else NOMINAL_SPEED
+
+
+def _onboard(samples: Samples, t: Array, flight: Flight, start: Fix) -> Array | None:
+    """The glider's own dead reckoning at times `t`, from 0 at the start of the flight; None if too sparse."""
+    lat = get(samples, "dr_lat").between(flight.start, flight.end)
+    lon = get(samples, "dr_lon").between(flight.start, flight.end)
+    duration = flight.end - flight.start
+    if (
+        len(lat) < 4
+        or lat.t[-1] - lat.t[0] < 0.8 * duration
+        or np.diff(lat.t).max() > max(SPARSE, 0.2 * duration)
+    ):
+        return None
+    xy = to_plane(lat.v, lon.v, start.lat, start.lon)
+    if np.hypot(*np.diff(xy, axis=0).T).max() > 3.0 * np.diff(lat.t).max():
+        return None  # it jumps to a fix within the flight: no dead reckoning
+    xy = xy - xy[0]
+    return np.stack([np.interp(t, lat.t, xy[:, 0]), np.interp(t, lat.t, xy[:, 1])], axis=-1)
+
+
+def evidence(samples: Samples, flight: Flight, track: Track) -> dict[str, float]:
+    """Numbers of one dive for people and rules; keys and units in `docs/nomenclature.md`."""
+    interval = float(track.t[-1] - track.t[0])
+    mean, flown = mean_heading(track)
+    out = {
+        "duration_h": (flight.end - flight.start) / 3600,
+        "drift_h": (interval - (flight.end - flight.start)) / 3600,
+        "ground_speed": float(np.hypot(*track.x[-1])) / interval,
+        "heading_steadiness": float(np.hypot(*mean)) * interval / max(flown, 1.0),
+        "heading_mean": degrees(atan2(mean[0], mean[1])) % 360,
+    }
+    return out | _attitude(samples, flight)
+
+
+def mean_heading(track: Track) -> tuple[Array, float]:
+    """Mean over the whole interval of the heading vector (zero at the surface), and seconds flown."""
+    dt = np.diff(track.t)
+    mean = (track.heading * dt[:, None]).sum(axis=0) / (track.t[-1] - track.t[0])
+    return mean, float(dt[np.any(track.heading != 0, axis=1)].sum())
+
+
+def closure(track: Track, current: Current) -> dict[str, float]:
+    """The closure test: what is left of the ground velocity (m/s) without the current.
+
+    ``along_speed`` is its part along the mean heading, divided by the length of that mean: the speed that
+    the glider's own flight model believes. ``across_misfit`` is the part across: near zero when
+    fixes, compass and current agree. Empty where the glider circled.
+    """
+    mean, flown = mean_heading(track)
+    length = float(np.hypot(*mean))
+    interval = float(track.t[-1] - track.t[0])
+    if length * interval < CIRCLING * max(flown, 1.0):
+        return {}
+    rest = track.x[-1] / interval - np.array([current.u, current.v])
+    return {
+        "along_speed": float(rest @ mean) / length**2,
+        "across_misfit": float(mean[0] * rest[1] - mean[1] * rest[0]) / length,
+    }
+
+
+def _attitude(samples: Samples, flight: Flight) -> dict[str, float]:
+    """Depth, pitch, roll and depth rate of the flight, as far as reported."""
+    out = {}
+    depth = get(samples, "depth").between(flight.start, flight.end)
+    pitch = get(samples, "pitch").between(flight.start, flight.end)
+    roll = get(samples, "roll").between(flight.start, flight.end)
+    speed = get(samples, "speed_onboard").between(flight.start, flight.end)
+    if len(depth) > 3:
+        out["depth_max"] = float(depth.v.max())
+    for name, part in (("pitch_dive", pitch.v[pitch.v < -0.1]), ("pitch_climb", pitch.v[pitch.v > 0.1])):
+        if len(part):
+            out[name] = float(np.mean(part))
+    if len(roll):
+        out |= {"roll_mean": float(np.mean(roll.v)), "roll_std": float(np.std(roll.v))}
+    if len(speed):
+        out["onboard_speed"] = float(np.mean(speed.v))
+    return out | _depth_rates(depth)
+
+
+def _depth_rates(depth: Series) -> dict[str, float]:
+    """Median rates of descent and climb (m/s) from depths at most 5 min apart, below the surface layer."""
+    if len(depth) < 6:
+        return {}
+    dt = np.diff(depth.t)
+    near = (dt > 0) & (dt < 300) & (np.minimum(depth.v[1:], depth.v[:-1]) > 3.0)
+    rate = np.diff(depth.v)[near] / dt[near]
+    out = {}
+    for name, part in (("depth_rate_dive", rate[rate > 0.02]), ("depth_rate_climb", rate[rate < -0.02])):
+        if len(part) >= 2:
+            out[name] = float(np.median(part))
+    return out
