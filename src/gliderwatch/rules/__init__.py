@@ -1,0 +1,1 @@
+"""From flags to incidents, and from incidents to what people are told. Pure."""

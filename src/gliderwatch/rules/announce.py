@@ -1,0 +1,186 @@
+"""What people have been told, compared with what is known: the messages that are due. Pure.
+
+Incidents are remade from the data whenever late data come; what was said stays said. So messages are never
+a by-product of a change: they are the difference between the two, found anew after every input. Nothing
+is said twice, and nothing that changed stays unsaid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from gliderwatch.alerts import message
+from gliderwatch.model import Alert, Assessment, Incident
+
+NEWS = 86400.0
+"""Seconds: an incident that was over for longer when it became known is history, not news."""
+SPEED_CHANGE = 0.02
+"""m/s: a smaller change of a speed that was told is not worth a correction."""
+FLOW_CHANGE = 0.05
+"""m/s: the same for the reference flow."""
+
+
+@dataclass(frozen=True, slots=True)
+class Thread:
+    """The messages of one incident: the incident and the dive as last ``told``, how many messages so far."""
+
+    id: str
+    told: Incident
+    dive: Assessment
+    messages: int
+    withdrawn: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What people have been told of one glider; ``surfaced`` is the surfacing of the last notice (s)."""
+
+    threads: tuple[Thread, ...] = ()
+    surfaced: float | None = None
+
+
+class Known(Protocol):
+    """What is known of one glider now; the store answers."""
+
+    def incidents(self) -> tuple[Incident, ...]:
+        """All its incidents."""
+
+    def dive(self, t_dive: float) -> Assessment | None:
+        """The dive that began at a time (s)."""
+
+    def last_surfacing(self, until: float) -> Assessment | None:
+        """The last dive that has ended with a fix and surfaced at `until` (s) or before."""
+
+
+def due(said: Said, known: Known, reminder_hours: float | None, notices: bool) -> tuple[Said, list[Alert]]:
+    """The messages to send now, and what will have been said then.
+
+    `notices`: whether anyone wants a notice of each surfacing.
+    """
+    latest = known.last_surfacing(float("inf"))
+    if latest is None:
+        return said, []
+    threads: list[Thread] = []
+    alerts: list[Alert] = []
+    incidents = known.incidents()
+    matched = _matched(said.threads, incidents)
+    for before in said.threads:
+        thread, more = _continued(before, matched.get(before.id), known, latest, reminder_hours)
+        threads.append(thread)
+        alerts += more
+    old = {i.id for i in matched.values()}
+    for incident in sorted(incidents, key=lambda i: i.opened_at):
+        if incident.id not in old and _is_news(incident, latest):
+            thread, more = _begun(incident, known, {t.id for t in threads})
+            threads.append(thread)
+            alerts += more
+    surfaced = said.surfaced
+    if notices and (surfaced is None or latest.t_surface > surfaced):
+        identity = f"{latest.glider}/surfacing/{latest.t_dive:.0f}"
+        before_it = known.last_surfacing(latest.t_surface - 1.0)
+        previous = before_it.t_surface if before_it is not None else None
+        alerts.append(message.surfacing(latest, previous, alert_id=identity))
+        surfaced = latest.t_surface
+    return Said(tuple(threads), surfaced), sorted(alerts, key=lambda a: a.time)
+
+
+def _matched(threads: Iterable[Thread], incidents: tuple[Incident, ...]) -> dict[str, Incident]:
+    """For each thread the incident that it is about now: the one told, else one of its kind and time."""
+    by_id = {i.id: i for i in incidents}
+    out = {t.id: by_id[t.told.id] for t in threads if t.told.id in by_id}
+    free = [i for i in incidents if i not in out.values()]
+    for thread in threads:
+        if thread.id not in out:
+            near = [i for i in free if i.kind == thread.told.kind and _overlap(i, thread.told)]
+            if near:
+                out[thread.id] = near[0]
+                free.remove(near[0])
+    return out
+
+
+def _overlap(a: Incident, b: Incident) -> bool:
+    forever = float("inf")
+    return a.since <= (b.cleared_at or forever) and b.since <= (a.cleared_at or forever)
+
+
+def _is_news(incident: Incident, latest: Assessment) -> bool:
+    return incident.cleared_at is None or latest.t_surface - incident.cleared_at < NEWS
+
+
+def _begun(incident: Incident, known: Known, taken: set[str]) -> tuple[Thread, list[Alert]]:
+    identity = incident.id
+    while identity in taken:
+        identity += "+"
+    alert = message.opened(incident, incident.last, alert_id=f"{identity}/0", audience=incident.severity)
+    alerts = [replace(alert, incident=identity)]
+    thread = Thread(identity, incident, incident.last, 1)
+    if incident.cleared_at is not None:
+        thread, more = _told(thread, incident, _clearing(incident, known), "all_clear")
+        alerts += more
+    return thread, alerts
+
+
+def _clearing(incident: Incident, known: Known) -> Assessment:
+    """The dive that cleared an incident."""
+    dive = known.last_surfacing(incident.cleared_at if incident.cleared_at is not None else float("inf"))
+    return dive if dive is not None else incident.last
+
+
+def _continued(
+    thread: Thread, now: Incident | None, known: Known, latest: Assessment, reminder_hours: float | None
+) -> tuple[Thread, list[Alert]]:
+    """One thread after what is known now, and its messages."""
+    dive = known.dive(thread.dive.t_dive) or latest
+    if now is None:
+        if thread.withdrawn:
+            return thread, []
+        told, alerts = _told(thread, None, dive, "correction", _why(thread, dive))
+        return replace(told, withdrawn=True), alerts
+    was_clear, is_clear = thread.told.cleared_at is not None, now.cleared_at is not None
+    if is_clear and not was_clear and not thread.withdrawn:
+        return _told(thread, now, _clearing(now, known), "all_clear")
+    moved = now.since != thread.told.since or now.cleared_at != thread.told.cleared_at
+    if moved or thread.withdrawn or _changed(thread.dive, dive):
+        return _told(thread, now, dive, "correction", _why(thread, dive))
+    hours = (latest.t_surface - thread.dive.t_surface) / 3600
+    if not is_clear and reminder_hours is not None and hours >= reminder_hours:
+        return _told(thread, now, latest, "reminder")
+    return thread, []
+
+
+def _changed(told: Assessment, now: Assessment) -> bool:
+    """Whether what was told of a dive is no longer true enough."""
+    if told.flag != now.flag or (told.speed is None) != (now.speed is None):
+        return True
+    if told.speed is not None and now.speed is not None and abs(told.speed - now.speed) > SPEED_CHANGE:
+        return True
+    pairs = ((told.reference_u, now.reference_u), (told.reference_v, now.reference_v))
+    return any((a is None) != (b is None) or abs((a or 0.0) - (b or 0.0)) > FLOW_CHANGE for a, b in pairs)
+
+
+def _why(thread: Thread, now: Assessment) -> str:
+    """What data changed a message, in words."""
+    if now.t_dive != thread.dive.t_dive or now.n_samples != thread.dive.n_samples:
+        return "a segment that came late completed the data"
+    if (now.reference_u, now.reference_v) != (thread.dive.reference_u, thread.dive.reference_v):
+        return "the depth-averaged current of the dive was corrected"
+    return "data that came late changed the dives before"
+
+
+def _told(
+    thread: Thread, now: Incident | None, dive: Assessment, what: str, why: str = ""
+) -> tuple[Thread, list[Alert]]:
+    """The thread after one more message, and the message."""
+    alert_id, audience = f"{thread.id}/{thread.messages}", thread.told.severity
+    if what == "correction":
+        alert = message.correction(thread.told, now, dive, why, alert_id=alert_id, audience=audience)
+    elif what == "all_clear" and now is not None:
+        alert = message.all_clear(now, dive, alert_id=alert_id, audience=audience)
+    else:
+        assert now is not None
+        hours = (dive.t_surface - now.since) / 3600
+        alert = message.reminder(now, dive, hours, alert_id=alert_id, audience=audience)
+    told = Thread(thread.id, now or thread.told, dive, thread.messages + 1)
+    return told, [replace(alert, incident=thread.id)]
