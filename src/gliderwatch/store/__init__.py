@@ -1,0 +1,1 @@
+"""The one state file: SQLite, written in one transaction per input."""
