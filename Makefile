@@ -1,0 +1,80 @@
+# gliderwatch. `make` alone lists the targets.
+
+PYTHON ?= python3
+# Wheels only, so that nothing is compiled behind your back. dbdreader has none for CPython 3.14
+# and for ARM: there, `make test WHEELS=` builds that one from source.
+WHEELS ?= --only-binary :all:
+# pytest processes; tests marked `timing` always run alone.
+JOBS ?= 2
+UV_VERSION := 0.13.9
+
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+WHEELHOUSE := dist/wheelhouse
+
+.DEFAULT_GOAL := help
+.PHONY: help install test demo lint format types contracts docs wheelhouse lock clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+
+# The locked packages, then the project itself in place: a second run finds both stamps and does nothing.
+$(VENV)/locked: requirements-dev.lock
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "gliderwatch needs Python 3.11 or later: make PYTHON=python3.11 ...")'
+	$(PYTHON) -m venv --clear $(VENV)
+	$(PIP) install --quiet --require-hashes $(WHEELS) -r requirements-dev.lock
+	@touch $@
+
+$(VENV)/installed: $(VENV)/locked pyproject.toml
+	$(PIP) install --quiet --no-deps --no-build-isolation --no-index --editable .
+	@touch $@
+
+install: $(VENV)/installed ## install gliderwatch and its tools into .venv, from the lock
+
+test: $(VENV)/installed ## run all tests; those that measure time first and alone
+	@mkdir -p build; rm -f build/tests-*.xml; failed=0; \
+	$(BIN)/python -m pytest -m timing --junit-xml=build/tests-timing.xml || [ $$? -eq 5 ] || failed=1; \
+	$(BIN)/python -m pytest -m "not timing" -n $(JOBS) --junit-xml=build/tests-main.xml || failed=1; \
+	exit $$failed
+
+demo: $(VENV)/installed ## a small dockserver, a faulty glider, the daemon, and the alert as it arrives
+	$(BIN)/python -m gliderwatch.demo
+
+lint: $(VENV)/installed ## ruff: rules and format
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+format: $(VENV)/installed ## let ruff mend what it can
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+types: $(VENV)/installed ## mypy, strict, on src
+	$(BIN)/mypy
+
+contracts: $(VENV)/installed ## who may import what (.importlinter)
+	$(BIN)/lint-imports
+
+docs: $(VENV)/installed ## make what in docs/ comes from the code
+	$(BIN)/python docs/generate.py
+
+wheelhouse: $(VENV)/installed ## everything a machine without internet needs, in one archive
+	rm -rf $(WHEELHOUSE)
+	$(PIP) download --quiet --require-hashes $(WHEELS) -r requirements.lock -d $(WHEELHOUSE)
+	$(PIP) wheel --quiet --no-deps --no-build-isolation --no-index -w $(WHEELHOUSE) .
+	cp -r requirements.lock config systemd docs/install.md docs/configuration.md $(WHEELHOUSE)
+	tar -C dist -czf dist/gliderwatch-wheelhouse.tar.gz wheelhouse
+	@echo "dist/gliderwatch-wheelhouse.tar.gz: for $$($(BIN)/python -V) on $$(uname -m); see docs/install.md"
+
+# The tests' lock takes the runtime's as its bounds, so that what is tested is what is installed.
+lock: ## choose the newest packages anew and write both lock files
+	$(PYTHON) -m venv build/uv
+	build/uv/bin/python -m pip install --quiet uv==$(UV_VERSION)
+	build/uv/bin/uv pip compile $(UV_FLAGS) pyproject.toml -o requirements.lock
+	build/uv/bin/uv pip compile $(UV_FLAGS) -c requirements.lock --group dev pyproject.toml -o requirements-dev.lock
+
+UV_FLAGS = --no-config --quiet --upgrade --universal --python-version 3.11 --only-binary :all: \
+	--generate-hashes --custom-compile-command "make lock"
+
+clean: ## remove what make made
+	rm -rf $(VENV) build dist

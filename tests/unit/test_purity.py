@@ -1,0 +1,85 @@
+"""What import contracts can not show: the core calls no clock, no file, no chance and has no globals."""
+
+import ast
+import configparser
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+# What a call looks like up to its opening bracket.
+IMPURE_CALL = re.compile(
+    r"(open|print|input|eval|exec|breakpoint|globals|__import__)"
+    r"|.*\.(now|utcnow|today|fromfile|genfromtxt|loadtxt|memmap|savetxt|tofile)"
+    r"|(np|numpy)\.(load|save|savez)"
+    r"|(.*\.)?random\..*"
+)
+# Conversions of time that use the machine's own zone unless told one, and the arguments it takes to tell.
+LOCAL_TIME = {"astimezone": 1, "fromtimestamp": 2}
+
+
+def pure_files() -> list[Path]:
+    """The files of the modules that the import contracts call pure."""
+    contracts = configparser.ConfigParser()
+    contracts.read(ROOT / ".importlinter")
+    files: list[Path] = []
+    for module in contracts["importlinter:contract:pure"]["source_modules"].split():
+        path = ROOT / "src" / Path(*module.split("."))
+        files += sorted(path.rglob("*.py")) or [path.with_suffix(".py")]
+    return files
+
+
+def impurities(source: str) -> list[str]:
+    """What in a module's text is not a function of its arguments, each with its line."""
+    nodes = list(ast.walk(ast.parse(source)))
+    found = [(node.lineno, ast.unparse(node)) for node in nodes if isinstance(node, ast.Global)]
+    found += [
+        (node.lineno, ast.unparse(node)) for node in nodes if isinstance(node, ast.Call) and _impure(node)
+    ]
+    return [f"line {line}: {text}" for line, text in sorted(found)]
+
+
+def _impure(call: ast.Call) -> bool:
+    text = ast.unparse(call.func)
+    needed = LOCAL_TIME.get(text.rpartition(".")[2], 0)
+    return bool(IMPURE_CALL.fullmatch(text)) or len(call.args) + len(call.keywords) < needed
+
+
+@pytest.mark.parametrize("path", pure_files(), ids=lambda path: str(path.relative_to(ROOT / "src")))
+def test_core_is_a_function_of_its_arguments(path: Path) -> None:
+    assert impurities(path.read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "datetime.now(UTC)",
+        "datetime.date.today()",
+        "datetime.fromtimestamp(t)",
+        "t.astimezone()",
+        "open('x')",
+        "print(1)",
+        "np.random.default_rng(0)",
+        "random.random()",
+        "np.load('x')",
+        "a.tofile('x')",
+        "def f():\n    global x",
+    ],
+)
+def test_impurity_is_seen(source: str) -> None:
+    assert len(impurities(source)) == 1
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "datetime.fromtimestamp(t, UTC)",
+        "datetime.fromtimestamp(t, tz=UTC)",
+        "t.astimezone(UTC)",
+        "incident.open(now)",
+    ],
+)
+def test_pure_text_is_left_alone(source: str) -> None:
+    assert impurities(source) == []
