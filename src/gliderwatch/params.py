@@ -7,7 +7,6 @@ Made by `gliderwatch.config` from the YAML, presets and defaults; the tables in
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import pi
 from typing import Literal
 
 from gliderwatch.model import Severity
@@ -26,8 +25,8 @@ class EstimatorParams:
     """Learning rate of the flow (1/s2)."""
     speed_gain: float | None = None
     """Learning rate of the speed (1/s2); None: as `gamma`."""
-    omega: float = 2 * pi * 1e-6
-    """Angular frequency of the basis functions (rad/s)."""
+    omega: float = 0.0
+    """Angular frequency of the basis functions (rad/s); 0: they vary in space alone (001, below eq. 6)."""
     nu: float = 0.0
     """Phase of the basis functions (rad)."""
     max_speed: float | None = None

@@ -30,8 +30,8 @@ class Memory:
 class GliderState:
     """All that is known of one glider after a segment: the checkpoint.
 
-    ``settled`` is the memory after all dives but the last one, ``last`` that dive, ``assessment`` and ``told``
-    what was said of it, ``memory`` the memory after it. When the current of the last dive is
+    ``settled`` is the memory after all dives but the last one, ``last`` that dive, ``assessment`` and
+    ``told`` what was said of it, ``memory`` the memory after it. When the current of the last dive is
     corrected, that dive is taken again from ``settled``.
     """
 

@@ -1,0 +1,1 @@
+"""The papers' estimator and its persistent state for one glider. Pure."""

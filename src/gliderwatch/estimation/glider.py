@@ -8,6 +8,7 @@ the planned centres of the configuration.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from gliderwatch.estimation.adaptive import (
     with_basis,
 )
 from gliderwatch.estimation.basis import new_centres, phi
-from gliderwatch.model import Array, Assessment, Dive, Fix, Track, readonly
+from gliderwatch.model import Array, Assessment, Current, Dive, Fix, Track, readonly
 from gliderwatch.navigation.frame import from_plane, to_plane
 from gliderwatch.navigation.track import closure
 from gliderwatch.params import GliderParams
@@ -67,20 +68,17 @@ def step(state: Estimate, dive: Dive, params: GliderParams, digest: str) -> tupl
     """
     if dive.track is None or dive.start is None or dive.end is None:
         return state, _assessment(dive, params, digest, dive.reason)
-    learner = learner_params(params)
+    gains = learner_params(params)
     state = _begin(state, dive, dive.start, params)
-    state, centres = _grow(state, dive.track, dive.start, params)
-    assert state.learner is not None
-    t = dive.track.t - state.begun
-    basis = learner.basis(centres)
-    if not state.learner.flown and dive.current is not None:
-        state = replace(state, learner=_with_flow(state.learner, dive, phi(dive.track.x[0], t[0], basis)))
-    after, info = advance(state.learner, t, dive.track.x, dive.track.heading, basis, learner)
+    learner, places, centres = _covering(state, dive.track, dive.start, params)
+    t, basis = dive.track.t - state.begun, gains.basis(centres)
+    if not learner.flown and dive.current is not None:
+        learner = _with_flow(learner, dive.current, phi(dive.track.x[0], t[0], basis))
+    learner, info = advance(learner, t, dive.track.x, dive.track.heading, basis, gains)
     reference = (dive.current.u, dive.current.v) if dive.current is not None else None
-    maxima = update(state.maxima, info.flow_speed_max, float(np.hypot(*reference)) if reference else 0.0)
-    knows_currents = maxima.reference > 0.0
-    state = replace(state, learner=after, maxima=maxima, end=dive.end)
-    return state, _judged(dive, params, digest, info, state, reference, knows_currents)
+    maxima = update(state.maxima, info.flow_speed_max, hypot(*reference) if reference else 0.0)
+    state = Estimate(learner, places, maxima, state.begun, dive.end)
+    return state, _judged(dive, params, digest, info, state, reference)
 
 
 def _begin(state: Estimate, dive: Dive, start: Fix, params: GliderParams) -> Estimate:
@@ -98,35 +96,34 @@ def _begin(state: Estimate, dive: Dive, start: Fix, params: GliderParams) -> Est
     return Estimate(init(speed, len(planned)), readonly(planned), FlowMaxima(), dive.t_dive, None)
 
 
-def _grow(state: Estimate, track: Track, start: Fix, params: GliderParams) -> tuple[Estimate, Array]:
-    """The estimate with basis functions that cover the track, and their centres in its plane (m)."""
+def _covering(
+    state: Estimate, track: Track, start: Fix, params: GliderParams
+) -> tuple[AdaptiveState, Array, Array]:
+    """The learner with functions that cover the track; their centres in degrees, and in its plane (m)."""
     assert state.learner is not None
     sigma, planned = params.estimator.sigma, len(params.estimator.centres)
     centres = to_plane(state.centres[:, 0], state.centres[:, 1], start.lat, start.lon)
     near = np.hypot(*(centres - track.x[-1]).T) < FORGOTTEN * sigma
     near[:planned] = True
-    learner, kept = state.learner, state.centres[near]
-    if not near.all():
-        learner = _without(learner, near)
     added = new_centres(centres[near], track.x, sigma)
-    if len(added):
-        learner = with_basis(learner, len(added))
-        places = [from_plane(c, start.lat, start.lon) for c in added]
-        kept = np.concatenate([kept, np.array(places).reshape(-1, 2)])
-    state = replace(state, learner=learner, centres=readonly(kept))
-    return state, np.concatenate([centres[near], added])
+    learner = with_basis(_with_only(state.learner, near), len(added))
+    places = np.array([from_plane(c, start.lat, start.lon) for c in added]).reshape(-1, 2)
+    return (
+        learner,
+        readonly(np.concatenate([state.centres[near], places])),
+        np.concatenate([centres[near], added]),
+    )
 
 
-def _without(learner: AdaptiveState, kept: NDArray[np.bool_]) -> AdaptiveState:
+def _with_only(learner: AdaptiveState, kept: NDArray[np.bool_]) -> AdaptiveState:
     """The learner with only those functions of its basis that are `kept`."""
     rows = np.concatenate([[True, True], kept])  # the two of the heading come first
     return replace(learner, xi=readonly(learner.xi[:, kept]), gram=readonly(learner.gram[rows][:, rows]))
 
 
-def _with_flow(learner: AdaptiveState, dive: Dive, values: Array) -> AdaptiveState:
-    """The first guess xi(0) that gives the current of the first dive at its start."""
-    assert dive.current is not None
-    xi = np.outer([dive.current.u, dive.current.v], values) / max(float(values @ values), 1e-9)
+def _with_flow(learner: AdaptiveState, current: Current, values: Array) -> AdaptiveState:
+    """The first guess xi(0) that gives the current of the first dive where the functions have `values`."""
+    xi = np.outer([current.u, current.v], values) / max(float(values @ values), 1e-9)
     return replace(learner, xi=readonly(xi))
 
 
@@ -137,7 +134,6 @@ def _judged(
     info: AdaptiveInfo,
     state: Estimate,
     reference: tuple[float, float] | None,
-    knows_currents: bool,
 ) -> Assessment:
     """Algorithm 2 on what the learner found, or the reason why it does not judge yet."""
     flow = (float(info.flow[0]), float(info.flow[1]))
@@ -146,7 +142,7 @@ def _judged(
     reason, verdict = "", None
     if state.learner is not None and state.learner.flown < warm_up(params):
         reason = "warming up"
-    elif reference is None and knows_currents:
+    elif reference is None and state.maxima.reference > 0.0:
         reason = "no depth-averaged current"
     else:
         if reference is None:

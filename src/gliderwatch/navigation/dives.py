@@ -27,10 +27,10 @@ LONGEST = 3 * 86400.0
 UNOBSERVED = 0.25
 """Share of the interval between two fixes that may be missing before a dive cannot be used."""
 BLIND = 0.8
-"""Share of a flight without any heading beyond which a dive cannot be used. Some files hold every third yo only:
-a glider on its way to a waypoint steers much the same in between."""
+"""Share of a flight without any heading beyond which a dive cannot be used. Some files hold every
+third yo only: a glider on its way to a waypoint steers much the same in between."""
 STEADY = 0.9
-"""Length of the mean of the headings seen above which the glider is taken to have kept it where none is seen."""
+"""Length of the mean of the headings seen above which the glider is taken to have kept it in between."""
 SURFACE = 0.5
 """Share of the interval between two fixes that the glider may have drifted before it cannot be used."""
 
@@ -178,10 +178,14 @@ def _why_unusable(state: Navigation, samples: Samples, flight: Flight, end: Fix 
     gap = _heading_gap(samples, flight)
     if gap > BLIND * (flight.end - flight.start):
         return f"no heading for {gap / 3600:.1f} h"
-    steady = np.hypot(
-        *(np.mean(get(samples, f"heading_{c}").between(flight.start, flight.end).v) for c in "en")
-    )
-    return f"turning, and no heading for {gap / 3600:.1f} h" if gap > 2 * SPARSE and steady < STEADY else ""
+    turning = gap > 2 * SPARSE and _heading_length(samples, flight) < STEADY
+    return f"turning, and no heading for {gap / 3600:.1f} h" if turning else ""
+
+
+def _heading_length(samples: Samples, flight: Flight) -> float:
+    """Length of the mean of the headings seen: 1 on a steady course."""
+    e, n = (get(samples, f"heading_{c}").between(flight.start, flight.end).v for c in "en")
+    return float(np.hypot(e.mean(), n.mean()))
 
 
 def _heading_gap(samples: Samples, flight: Flight) -> float:

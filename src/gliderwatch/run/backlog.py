@@ -1,0 +1,74 @@
+"""Files on their way from settled to taken: in order within a glider, in turn between gliders."""
+
+from __future__ import annotations
+
+import heapq
+from collections import OrderedDict, deque
+from dataclasses import dataclass, field
+
+from gliderwatch.ingest.header import Header
+from gliderwatch.model import Segment
+from gliderwatch.store.sqlite import File
+
+
+@dataclass(slots=True)
+class Job:
+    """A file to decode; ``result`` is there once it is decoded or has failed."""
+
+    file: File
+    header: Header
+    result: Segment | Exception | None = None
+
+
+@dataclass(slots=True)
+class _Queue:
+    waiting: list[tuple[float, str, str, Job]] = field(default_factory=list)
+    decoding: deque[Job] = field(default_factory=deque)
+
+
+class Backlog:
+    """Oldest first within each glider, so that nothing has to be taken back; gliders take turns.
+
+    One glider with a month of files delays no other, and one file that takes long to decode delays its own
+    glider alone.
+    """
+
+    def __init__(self) -> None:
+        self._queues: OrderedDict[str, _Queue] = OrderedDict()
+        self._paths: set[str] = set()
+
+    def __len__(self) -> int:
+        return len(self._paths)
+
+    def add(self, job: Job) -> None:
+        """Put a file into the queue of its glider; one that is there already stays as it is."""
+        if job.file.path in self._paths:
+            return
+        self._paths.add(job.file.path)
+        queue = self._queues.setdefault(job.header.id.glider, _Queue())
+        heapq.heappush(queue.waiting, (job.header.id.opened_at, job.header.id.name, job.file.path, job))
+
+    def next(self) -> Job | None:
+        """The file to decode next, None when all are being decoded."""
+        for glider, queue in self._queues.items():
+            if queue.waiting:
+                job = heapq.heappop(queue.waiting)[-1]
+                queue.decoding.append(job)
+                self._queues.move_to_end(glider)
+                return job
+        return None
+
+    def decoded(self, glider: str) -> Job | None:
+        """The next file of a glider to take: decoded, and none before it still being decoded."""
+        queue = self._queues.get(glider)
+        if queue is None or not queue.decoding or queue.decoding[0].result is None:
+            return None
+        job = queue.decoding.popleft()
+        self._paths.discard(job.file.path)
+        if not queue.waiting and not queue.decoding:
+            del self._queues[glider]
+        return job
+
+    def more(self, glider: str) -> bool:
+        """Whether more files of a glider are at hand."""
+        return glider in self._queues

@@ -1,0 +1,209 @@
+"""A past mission through the same path as a live one, with a state of its own."""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from gliderwatch.alerts.channels import Channel
+from gliderwatch.alerts.outbox import Dispatcher
+from gliderwatch.config import Config, expand
+from gliderwatch.errors import GliderwatchError
+from gliderwatch.ingest import names
+from gliderwatch.ingest.decode import Decoder
+from gliderwatch.model import Segment
+from gliderwatch.params import GliderParams
+from gliderwatch.run import arrivals, intake
+from gliderwatch.run.backlog import Job
+from gliderwatch.run.intake import Speaking
+from gliderwatch.run.lines import alert_line, assessment_line, write_lines
+from gliderwatch.run.speaking import NOBODY, speaking
+from gliderwatch.store.database import MEMORY
+from gliderwatch.store.outbox import Outbox
+from gliderwatch.store.sqlite import Status, Store
+
+SEND_PATIENCE = 120.0
+"""Seconds that `--send` waits at the end for messages to be delivered."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What to replay: folders, cache folders, the configuration (None: defaults), one glider or all,
+    where results go, whether alerts are sent."""
+
+    folders: tuple[Path, ...]
+    caches: tuple[Path, ...] = ()
+    config: Config | None = None
+    glider: str | None = None
+    out: Path | None = None
+    send: bool = False
+
+    def params(self, glider: str) -> GliderParams:
+        """The parameters of a glider."""
+        return GliderParams() if self.config is None else self.config.glider(glider)
+
+    def is_wanted(self, glider: str) -> bool:
+        """Whether a glider is to be replayed: the one named, else those of the configuration, else all."""
+        if self.glider is not None:
+            return glider == self.glider
+        return self.config is None or glider in self.config.gliders
+
+
+@dataclass(slots=True)
+class Report:
+    """What a replay found: files by status with reasons, and the store that holds the rest."""
+
+    store: Store
+    files: Counter[Status] = field(default_factory=Counter)
+    undelivered: int = 0
+
+
+def replay(
+    request: Request,
+    *,
+    on_total: Callable[[int], None] = lambda n: None,
+    on_file: Callable[[intake.Taken], None] = lambda taken: None,
+    workers: int = 1,
+) -> Report:
+    """Replay the files of some folders in the order of time. Raises GliderwatchError where there are none."""
+    files = find_files(request.folders)
+    if not files:
+        where = ", ".join(map(str, request.folders))
+        raise GliderwatchError(f"no flight data files (sbd, scd, mbd, mcd, dbd, dcd) below {where}")
+    on_total(len(files))
+    caches = cache_folders(request)
+    with _state(request) as path:
+        report = Report(Store.open(path, durable=False))
+        with _speaking(request, path, report) as told:
+            jobs = _triage(files, report, caches, request, on_file)
+            for job in _decoded(jobs, caches, workers):
+                _take(job, report, request, told, on_file)
+        if request.out is not None:
+            _write(request.out, report.store)
+    return report
+
+
+def find_files(folders: Iterable[Path]) -> list[Path]:
+    """All flight data files below some folders, each once."""
+    found = {
+        path: None
+        for folder in folders
+        for path in sorted([folder] if folder.is_file() else folder.rglob("*"))
+        if names.kind(path.name) is not None and not path.is_dir()
+    }
+    return list(found)
+
+
+def cache_folders(request: Request) -> list[Path]:
+    """The cache folders named and configured, the folders replayed, and any `cache` in or beside them."""
+    folders = [*request.caches]
+    if request.config is not None:
+        folders += expand(request.config.dockserver.cache)
+    for folder in request.folders:
+        around = [
+            folder,
+            *folder.glob("[cC][aA][cC][hH][eE]"),
+            *folder.resolve().parent.glob("[cC][aA][cC][hH][eE]"),
+        ]
+        folders += [f for f in around if f.is_dir()]
+    return list(dict.fromkeys(folders))
+
+
+@contextmanager
+def _state(request: Request) -> Iterator[Path | str]:
+    """Where the replay keeps its state: never where the daemon does."""
+    if request.out is not None:
+        request.out.mkdir(parents=True, exist_ok=True)
+        path = request.out / "state.sqlite"
+        for old in (path, *request.out.glob("state.sqlite-*")):
+            old.unlink(missing_ok=True)  # of an earlier replay: this one starts from nothing
+        yield path
+    elif request.send:
+        with tempfile.TemporaryDirectory(prefix="gliderwatch-") as folder:
+            yield Path(folder) / "state.sqlite"
+    else:
+        yield MEMORY
+
+
+@contextmanager
+def _speaking(request: Request, path: Path | str, report: Report) -> Iterator[Speaking]:
+    """Who is told: nobody, or with `send` whom the configuration says, until all is delivered."""
+    if not request.send or request.config is None:
+        yield NOBODY if request.config is None else _silent(request.config)
+        return
+    config, wake = request.config, threading.Event()
+    channels = {n: Channel(n, config.channel_url(n).get_secret_value()) for n in config.channels}
+    outbox = Path(path)
+    dispatcher = Dispatcher(lambda: Outbox(outbox), channels, time.time, wake)
+    dispatcher.start()
+    yield speaking(config)
+    deadline = time.monotonic() + SEND_PATIENCE
+    while (left := report.store.undelivered()) and time.monotonic() < deadline:
+        wake.set()
+        time.sleep(0.05)
+    dispatcher.stop()
+    report.undelivered = len(left)
+
+
+def _silent(config: Config) -> Speaking:
+    """The messages of a configuration, for nobody: they are made and shown, not sent."""
+    return Speaking(channels=NOBODY.channels, notices=speaking(config).notices)
+
+
+def _triage(
+    files: Sequence[Path],
+    report: Report,
+    caches: Sequence[Path],
+    request: Request,
+    on_file: Callable[[intake.Taken], None],
+) -> list[Job]:
+    """The files to decode in the order of time, the fullest copy of a segment first."""
+    jobs = []
+    for path in files:
+        found = arrivals.judge(arrivals.seen(path), report.store, caches, request.is_wanted)
+        if isinstance(found, Job):
+            jobs.append(found)
+        elif found is not None:
+            _count(intake.note(report.store, found, GliderParams(), None, time.time()), report, on_file)
+    return sorted(jobs, key=lambda j: (j.header.id, -names.rank(j.header.kind), j.file.path))
+
+
+def _decoded(jobs: Sequence[Job], caches: Sequence[Path], workers: int) -> Iterator[Job]:
+    with Decoder(caches, max_workers=workers) as decoder:
+        results = decoder.map([Path(job.file.path) for job in jobs])
+        for job, (_, result) in zip(jobs, results, strict=True):
+            job.result = result
+            yield job
+
+
+def _take(
+    job: Job,
+    report: Report,
+    request: Request,
+    told: Speaking,
+    on_file: Callable[[intake.Taken], None],
+) -> None:
+    params = request.params(job.header.id.glider)
+    if isinstance(job.result, Segment):
+        taken = intake.take(report.store, job.file, job.result, params, told, time.time())
+    else:
+        error = job.result if job.result is not None else GliderwatchError("was not decoded")
+        taken = intake.note(report.store, arrivals.failed(job.file, error), params, told, time.time())
+    _count(taken, report, on_file)
+
+
+def _count(taken: intake.Taken, report: Report, on_file: Callable[[intake.Taken], None]) -> None:
+    report.files[taken.file.status] += 1
+    on_file(taken)
+
+
+def _write(out: Path, store: Store) -> None:
+    assessments = (assessment_line(a) for glider in store.gliders() for a in store.assessments(glider))
+    write_lines(out / "assessments.jsonl", assessments)
+    write_lines(out / "alerts.jsonl", (alert_line(a) for a in store.alerts()))

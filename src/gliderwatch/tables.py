@@ -1,0 +1,121 @@
+"""What commands show on a terminal: tables that fit it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from gliderwatch.alerts.words import clean, duration, place, utc
+from gliderwatch.config import Problem
+from gliderwatch.model import Assessment, Flag, Severity
+from gliderwatch.run.lines import iso
+from gliderwatch.run.status import GliderStatus, Overview
+from gliderwatch.store.sqlite import File, Status
+
+_FLAGS = {Flag.NORMAL: "[green]0 normal[/]", Flag.ANOMALY: "[bold red]1 anomaly[/]"}
+_FALSE = "[yellow]2 false alarm[/]"
+_STYLES = {Severity.CRITICAL: "bold red", Severity.WARNING: "yellow", Severity.INFO: "cyan"}
+
+
+def flag(a: Assessment) -> str:
+    """A flag in words with its colour, or why there is none."""
+    return f"[dim]{_safe(a.reason)}[/]" if a.flag is None else _FLAGS.get(Flag(a.flag), _FALSE)
+
+
+def _safe(text: str) -> str:
+    """Text from files, in which brackets are no markup."""
+    return clean(text).replace("[", r"\[")
+
+
+def _number(value: float | None, form: str = ".2f") -> str:
+    return "" if value is None else format(value, form)
+
+
+def _vector(u: float | None, v: float | None) -> str:
+    return "" if u is None or v is None else f"{u:+.2f} {v:+.2f}"
+
+
+def dives(assessments: Sequence[Assessment]) -> Table:
+    """The dives of a mission, one a line; 80 columns."""
+    years = sorted({iso(a.t_surface)[:4] for a in assessments})
+    table = Table(f"{'/'.join(years)} UTC", "h", box=None, pad_edge=False, header_style="bold")
+    table.add_column("flag", max_width=14)
+    for column in table.columns:
+        column.no_wrap = True
+    for name in ("speed", "own", "flow E N", "DAC E N", "p_E", "CLLE"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for a in assessments:
+        table.add_row(
+            iso(a.t_surface)[5:16].replace("T", " "),
+            _number(a.evidence.get("duration_h"), ".1f"),
+            flag(a),
+            _number(a.speed),
+            _number(a.evidence.get("along_speed")),
+            _vector(a.flow_u, a.flow_v),
+            _vector(a.reference_u, a.reference_v),
+            _number(a.p_e),
+            _number(a.clle_max, ".0f"),
+        )
+    return table
+
+
+def files(counts: dict[Status, int], left_out: Sequence[File], console: Console, most: int = 20) -> None:
+    """What became of files: how many of each status, and why those that were not taken were not."""
+    console.print("files: " + (", ".join(f"{n} {status}" for status, n in counts.items()) or "none"))
+    for file in left_out[:most]:
+        console.print(Text(f"  {file.status}  {clean(file.path, 500)}: {clean(file.reason)}"), soft_wrap=True)
+    if len(left_out) > most:
+        console.print(f"  and {len(left_out) - most} more")
+
+
+def status(view: Overview, console: Console) -> None:
+    """The overview of a running service."""
+    silent = "never gave a sign of life" if view.silent_for is None else duration(view.silent_for) + " ago"
+    state = "[green]alive[/]" if view.alive else "[bold red]NOT RUNNING[/]"
+    console.print(f"gliderwatch is {state} (last sign of life: {silent})")
+    table = Table("glider", "surfaced (UTC)", "place", "flag", box=None, pad_edge=False, header_style="bold")
+    for name in ("speed", "range", "dives"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for glider in view.gliders:
+        table.add_row(*_glider(glider))
+    console.print(table)
+    for glider in view.gliders:
+        for i in glider.incidents:
+            text = f"{clean(i.glider)}: {i.kind} open since {utc(i.since)}, {i.dives} dives"
+            console.print(Text(text, style=_STYLES[i.severity]))
+    files(view.files, [*view.waiting, *view.quarantined], console)
+    if view.unknown:
+        names = ", ".join(clean(g) for g in sorted({f.glider for f in view.unknown}))
+        console.print(
+            Text(f"gliders not in the configuration: {names} ({len(view.unknown)} files left alone)")
+        )
+    for u in view.undelivered:
+        why = f": {clean(u.error)}" if u.error else ""
+        console.print(Text(f"undelivered: {clean(u.alert)} by {u.channel}, {u.attempts} attempts{why}"))
+
+
+def _glider(g: GliderStatus) -> list[str]:
+    name = _safe(g.name) if g.configured else f"[dim]{_safe(g.name)}[/]"
+    a = g.latest
+    if a is None:
+        return [name, "[dim]no dive yet[/]", "", "", "", "", str(g.dives)]
+    where = place(a.lat, a.lon).split(" (")[0]
+    speeds = f"{a.speed_min:.2f}-{a.speed_max:.2f}"
+    return [
+        name,
+        utc(a.t_surface).removesuffix(" UTC"),
+        where,
+        flag(a),
+        _number(a.speed),
+        speeds,
+        str(g.dives),
+    ]
+
+
+def problems(found: Sequence[Problem], console: Console) -> None:
+    """What `check` found, the worst first."""
+    for problem in sorted(found, key=lambda p: p.severity):
+        console.print(Text(str(problem)), soft_wrap=True)
