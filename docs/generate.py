@@ -1,0 +1,189 @@
+"""Writes `configuration.md` and `gliderwatch.schema.json` from the models of the settings.
+
+    python docs/generate.py
+
+Run it after a change of `gliderwatch.config`; a test fails while the files are out of date.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from gliderwatch.config import Config
+from gliderwatch.model import Severity
+
+HERE = Path(__file__).parent
+Schema = dict[str, Any]
+
+INTRO = """\
+# Configuration
+
+One YAML file; `config/gliderwatch.yml` is a commented one to copy. Ask `gliderwatch check -c FILE`
+before you start: it names the line of everything that is wrong, and looks at the folders, caches
+and channels too. An editor that knows JSON Schema completes and checks it with
+`gliderwatch.schema.json` of this folder.
+
+*This page is made by `docs/generate.py`.*
+
+## Which value counts
+
+For each glider, a later one wins, key by key:
+
+1. the built-in default (the tables below),
+2. the preset that the glider names, else the one that `defaults` names,
+3. `defaults`,
+4. the glider's own section under `gliders`.
+
+A key that is given as `null` counts as given, where `null` has a meaning.
+
+## Names and paths
+
+Gliders are matched by the name of their folder in lower case. A folder of a glider that is not under
+`gliders` is listed by `check` and `status`, and not watched. Relative paths start at the folder of
+the configuration file. Patterns know `*`, `?` and `[...]`; they are looked up again at each rescan.
+
+## Secrets
+
+A channel's URL, or any part of it, can come from outside of the file:
+
+| written | taken from |
+| --- | --- |
+| `${NAME}` | environment variable |
+| `${file:PATH}` | text of a file, one line |
+| `${credential:NAME}` | systemd credential (`LoadCredential=NAME:PATH` of the service) |
+| `url: {file: PATH}` | a file with the whole URL |
+
+A value before the `@` of the address (`user:${PASSWORD}@host`) or after its `?` is percent-encoded
+for you: store passwords as they are. Elsewhere it is put in as it is, so that it may be a whole URL or
+a path of tokens. Values are never printed.
+"""
+
+
+def schema() -> Schema:
+    """The JSON Schema of the configuration file."""
+    made = _tidy(Config.model_json_schema())
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "gliderwatch configuration",
+        **made,
+    }
+
+
+def _tidy(node: Any, *, names: bool = False) -> Any:
+    """Without the titles that pydantic derives from names; severities by name. ``names``: keys are names."""
+    if isinstance(node, list):
+        return [_tidy(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    if not names:
+        node = {key: value for key, value in node.items() if key != "title" and not _is_section(key, node)}
+        if "enum" in node and isinstance(node.get("default"), int):
+            node["default"] = Severity(node["default"]).name.lower()
+        if "patternProperties" in node:
+            node["additionalProperties"] = False
+    return {
+        key: _tidy(value, names=key in {"properties", "patternProperties", "$defs"})
+        for key, value in node.items()
+    }
+
+
+def _is_section(key: str, node: Schema) -> bool:
+    return key == "default" and "$ref" in node  # its keys have their own defaults
+
+
+def configuration() -> str:
+    """The page on the configuration, as Markdown."""
+    made = schema()
+    parts = [INTRO]
+    for path, section in _sections(made, made, ""):
+        parts.append(f"## `{path}`\n\n{_prose(section['description'])}\n")
+        properties = section["properties"]
+        if path == "gliders.NAME":
+            shared = made["$defs"]["Settings"]["properties"]
+            properties = {key: value for key, value in properties.items() if key not in shared}
+            parts.append("All keys of [`defaults`](#defaults), and:\n")
+        rows = [_row(path, key, value, section) for key, value in properties.items()]
+        parts.append(
+            "\n".join(["| key | value | default | meaning |", "| --- | --- | --- | --- |", *rows, ""])
+        )
+    return "\n".join(parts)
+
+
+def _sections(root: Schema, node: Schema, path: str) -> Iterator[tuple[str, Schema]]:
+    """Path and schema of each section below `node`, depth first; a glider's are as the defaults'."""
+    if path == "gliders.NAME":
+        return
+    for key, value in node["properties"].items():
+        named = next(iter(value.get("patternProperties", {}).values()), {})
+        ref = value.get("$ref") or named.get("$ref")
+        if ref:
+            below = ".".join(filter(None, [path, key, "NAME" if named else ""]))
+            section = root["$defs"][ref.removeprefix("#/$defs/")]
+            yield below, section
+            yield from _sections(root, section, below)
+
+
+def _row(path: str, key: str, value: Schema, section: Schema) -> str:
+    cells = [f"`{key}`", _kind(value), _default(key, value, section), _prose(value["description"])]
+    if "$ref" in value:
+        anchor = f"{path}.{key}".replace(".", "").lower()
+        cells[1:3] = [f"[section](#{anchor})", ""]
+    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
+
+
+def _prose(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _kind(value: Schema) -> str:
+    """What may be written, in a few words."""
+    if "enum" in value:
+        return ", ".join(f"`{choice}`" for choice in value["enum"])
+    for choices in ("anyOf", "oneOf"):
+        if choices in value:
+            return " or ".join(_kind(choice) for choice in value[choices])
+    types = value.get("type", "object")
+    kind = types if isinstance(types, str) else types[0]
+    words = {
+        "string": "text",
+        "array": "list",
+        "integer": "whole number",
+        "object": "`{file: PATH}`",
+        "null": "`null`",
+    }
+    return f"{words.get(kind, kind)}{_bounds(value)}"
+
+
+def _bounds(value: Schema) -> str:
+    low, above = value.get("minimum"), value.get("exclusiveMinimum")
+    high = value.get("maximum")
+    if above is not None:
+        return f" > {above:g}, ≤ {high:g}"
+    return f" {low:g} to {high:g}" if low is not None else ""
+
+
+def _default(key: str, value: Schema, section: Schema) -> str:
+    if key in section.get("required", []):
+        return "required"
+    default = value.get("default")
+    if isinstance(default, str):
+        return f"`{default}`"
+    if default is None or default == []:
+        return f"`{json.dumps(default)}`"
+    return f"`{default:g}`"
+
+
+def documents() -> dict[Path, str]:
+    """The text of each generated file."""
+    return {
+        HERE / "configuration.md": configuration(),
+        HERE / "gliderwatch.schema.json": json.dumps(schema(), indent=2) + "\n",
+    }
+
+
+if __name__ == "__main__":
+    for path, text in documents().items():
+        path.write_text(text, encoding="utf-8")

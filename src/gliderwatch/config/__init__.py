@@ -1,0 +1,27 @@
+"""The settings: one YAML file, read with line numbers, checked, and turned into plain values.
+
+The only place that reads settings from files and the environment. `load` gives a `Config` or
+raises `ConfigError` with every problem in it; `check` looks at the folders and channels that it
+names.
+"""
+
+from gliderwatch.config.checking import check
+from gliderwatch.config.loading import load
+from gliderwatch.config.paths import expand, glider_folders
+from gliderwatch.config.problem import Problem
+from gliderwatch.config.root import Config
+from gliderwatch.config.sections import Channel, Dockserver, Glider, Recipient, State
+
+__all__ = [
+    "Channel",
+    "Config",
+    "Dockserver",
+    "Glider",
+    "Problem",
+    "Recipient",
+    "State",
+    "check",
+    "expand",
+    "glider_folders",
+    "load",
+]

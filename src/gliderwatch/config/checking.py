@@ -1,0 +1,176 @@
+"""Does what the settings name exist? Folders, caches, the state, channels; nothing is sent or written."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from gliderwatch.config import references
+from gliderwatch.config.paths import FROM_GLIDER, expand, glider_folders, is_folder
+from gliderwatch.config.problem import Problem
+from gliderwatch.config.root import Config
+from gliderwatch.errors import ConfigError
+
+_CACHES = {".cac", ".ccc"}
+_FREE_BYTES = 200e6
+_LET_READ = "chmod or setfacl, or add this user to the group of the folder"
+
+
+@dataclass(frozen=True, slots=True)
+class _Finding:
+    severity: Literal["error", "warning"]
+    key: str
+    text: str
+    cure: str
+
+
+_Findings = Iterator[_Finding]
+
+
+def check(config: Config, path: Path) -> list[Problem]:
+    """Everything outside of the settings file ``path`` that is not as it says, with the line.
+
+    What can be read depends on the user: run it as the user that runs the service.
+    """
+    parts = (_roots, _gliders, _caches, _state, _channels, _recipients)
+    findings = [found for part in parts for found in part(config)]
+    return [
+        Problem(each.severity, f"{path}:{config.locate(each.key)}", f"{each.key}: {each.text}", each.cure)
+        for each in findings
+    ]
+
+
+def _error(key: str, text: str, cure: str) -> _Finding:
+    return _Finding("error", key, text, cure)
+
+
+def _warning(key: str, text: str, cure: str) -> _Finding:
+    return _Finding("warning", key, text, cure)
+
+
+def _can_read(folder: Path) -> bool:
+    return is_folder(folder) and os.access(folder, os.R_OK | os.X_OK)
+
+
+def _folders(section: str, patterns: tuple[str, ...]) -> Iterator[tuple[str, Path]]:
+    """Key and folder of everything that patterns of the settings match."""
+    for i, pattern in enumerate(patterns):
+        for folder in expand([pattern]):
+            yield f"{section}.{i}", folder
+
+
+def _unusable(section: str, patterns: tuple[str, ...]) -> _Findings:
+    """Paths and patterns without a folder, and folders that cannot be read."""
+    for i, pattern in enumerate(patterns):
+        key, matches = f"{section}.{i}", expand([pattern])
+        folders = [match for match in matches if is_folder(match)]
+        if not matches:
+            cure = "correct the path, or create it; a folder above it may also be closed to this user"
+            yield _error(key, f"{pattern} is not there", cure)
+        elif not folders:
+            yield _error(key, f"{pattern} is not a folder", "name the folder")
+        for folder in folders:
+            if not _can_read(folder):
+                yield _error(key, f"{folder} cannot be read", _LET_READ)
+
+
+def _roots(config: Config) -> _Findings:
+    roots = config.dockserver.roots
+    yield from _unusable("dockserver.roots", roots)
+    for key, folder in _folders("dockserver.roots", roots):
+        if is_folder(folder / FROM_GLIDER):
+            yield _error(key, f"{folder} is the folder of one glider", f"give {folder.parent}")
+
+
+def _found(config: Config) -> dict[str, list[Path]]:
+    """From-glider folders below the roots, by glider."""
+    found: dict[str, list[Path]] = {}
+    for _, root in _folders("dockserver.roots", config.dockserver.roots):
+        if _can_read(root):
+            for name, folder in glider_folders(root):
+                found.setdefault(name, []).append(folder)
+    return found
+
+
+def _gliders(config: Config) -> _Findings:
+    found = _found(config)
+    if not config.gliders:
+        yield _warning("gliders", "no glider is configured: none is watched", "add their names")
+    for name, glider in config.gliders.items():
+        key = f"gliders.{name}"
+        yield from _unusable(f"{key}.paths", glider.paths)
+        if name not in found and not glider.paths:
+            cure = "wait for its first file, correct the name, or give `paths`"
+            yield _warning(key, f"no folder {name}/{FROM_GLIDER} below the roots", cure)
+        for folder in found.get(name, []):
+            if not _can_read(folder):
+                yield _error(key, f"{folder} cannot be read", _LET_READ)
+    strangers = sorted(set(found) - set(config.gliders))
+    if strangers:
+        text = f"not configured, so not watched: {', '.join(strangers)}"
+        yield _warning("gliders", text, "add those that fly")
+
+
+def _caches(config: Config) -> _Findings:
+    key, patterns = "dockserver.cache", config.dockserver.cache
+    yield from _unusable(key, patterns)
+    if not patterns:
+        yield _warning(key, "no cache folder: most files cannot be read", "name the folder of `.cac`")
+    for place, folder in _folders(key, patterns):
+        if _can_read(folder) and not any(file.suffix.lower() in _CACHES for file in folder.iterdir()):
+            yield _warning(place, f"{folder} holds no .cac or .ccc", "correct the path")
+
+
+def _state(config: Config) -> _Findings:
+    key, path = "state.path", Path(config.state.path)
+    folder = path.parent
+    if is_folder(path):
+        yield _error(key, f"{path} is a folder", "name a file in it")
+    elif not is_folder(folder):
+        yield _error(key, f"the folder {folder} is not there", "create it, owned by the user of the service")
+    elif not os.access(folder, os.W_OK | os.X_OK) or (
+        os.access(path, os.F_OK) and not os.access(path, os.W_OK)
+    ):
+        yield _error(key, f"{path} cannot be written by this user", "chown it")
+    elif shutil.disk_usage(folder).free < _FREE_BYTES:
+        yield _warning(key, f"less than {_FREE_BYTES / 1e6:g} MB are free in {folder}", "make room")
+    for _, root in _folders("dockserver.roots", config.dockserver.roots):
+        if path.is_relative_to(root):
+            yield _error(key, f"lies below the root {root}", "put it elsewhere")
+
+
+def _channels(config: Config) -> _Findings:
+    for name, channel in config.channels.items():
+        key = f"channels.{name}.url"
+        template = channel.url.get_secret_value()
+        try:
+            url = references.resolve(template, config.folder)
+        except ConfigError as error:
+            if references.needs_credentials(template) and references.CREDENTIALS not in os.environ:
+                yield _warning(key, str(error), "credentials are only there inside of the service")
+            else:
+                yield _error(key, str(error), "set it where the service gets it from")
+            continue
+        from gliderwatch.alerts.channels import problem  # noqa: PLC0415 (apprise behind it is slow to load)
+
+        found = problem(url)
+        if found:
+            yield _error(key, found, "compare with https://github.com/caronc/apprise/wiki")
+
+
+def _recipients(config: Config) -> _Findings:
+    if not config.recipients:
+        yield _warning("recipients", "there are none: nobody is told anything", "add one")
+        return
+    used = {channel for recipient in config.recipients.values() for channel in recipient.channels}
+    for channel in sorted(set(config.channels) - used):
+        yield _warning(f"channels.{channel}", "no recipient uses it", "name it in one")
+    if any(recipient.gliders is None for recipient in config.recipients.values()):
+        return
+    heard = {glider for recipient in config.recipients.values() for glider in recipient.gliders or ()}
+    for glider in sorted(set(config.gliders) - heard):
+        yield _warning(f"gliders.{glider}", "no recipient gets its alerts", "name it in one")

@@ -1,0 +1,79 @@
+"""Types of single settings: what may stand there and how it reads in the JSON Schema."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    PlainSerializer,
+    SecretStr,
+    StringConstraints,
+    WithJsonSchema,
+)
+
+from gliderwatch.config import references
+from gliderwatch.config.paths import absolute
+from gliderwatch.model import Severity
+
+
+def _severity(value: object) -> object:
+    if isinstance(value, str) and value in {severity.name.lower() for severity in Severity}:
+        return Severity[value.upper()]
+    raise ValueError("must be info, warning or critical")
+
+
+def _quieter(severity: Severity) -> Severity:
+    if severity is Severity.CRITICAL:
+        raise ValueError("must be info or warning: critical is for anomalies")
+    return severity
+
+
+def _url(value: object) -> object:
+    if isinstance(value, dict):
+        if set(value) != {"file"} or not isinstance(value["file"], str):
+            raise ValueError("must be a URL or {file: PATH}")
+        return f"${{file:{value['file']}}}"
+    return value
+
+
+def _references(value: SecretStr) -> SecretStr:
+    references.verify(value.get_secret_value())
+    return value
+
+
+# Strict: quoted numbers and `true` for 1 are mistakes. Bounds only refuse what cannot be meant.
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Count = Annotated[int, Field(strict=True, ge=1, le=100)]
+Speed = Annotated[Number, Field(ge=0, le=5)]
+AbsolutePath = Annotated[str, StringConstraints(min_length=1), AfterValidator(absolute)]
+GliderName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", to_lower=True)]
+Name = Annotated[str, StringConstraints(pattern=r"^\w[\w .-]*$", max_length=64)]
+Loudness = Annotated[
+    Severity,
+    BeforeValidator(_severity),
+    PlainSerializer(lambda severity: severity.name.lower(), return_type=str),
+    WithJsonSchema({"enum": ["info", "warning", "critical"]}),
+]
+Quieter = Annotated[Loudness, AfterValidator(_quieter), WithJsonSchema({"enum": ["info", "warning"]})]
+Url = Annotated[
+    SecretStr,
+    BeforeValidator(_url),
+    Field(min_length=1),
+    AfterValidator(_references),
+    WithJsonSchema(
+        {
+            "oneOf": [
+                {"type": "string", "minLength": 1},
+                {
+                    "type": "object",
+                    "properties": {"file": {"type": "string"}},
+                    "required": ["file"],
+                    "additionalProperties": False,
+                },
+            ]
+        }
+    ),
+]

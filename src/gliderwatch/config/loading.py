@@ -1,0 +1,181 @@
+"""Reading the settings: every problem of the file in one `ConfigError`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, get_args, get_origin
+
+from pydantic import TypeAdapter, ValidationError
+
+from gliderwatch.config.document import Document, read
+from gliderwatch.config.problem import Problem, nearest, shown
+from gliderwatch.config.root import Config
+from gliderwatch.config.sections import Preset, Section
+from gliderwatch.errors import ConfigError
+
+_PRESETS = dict[str, Preset]
+_WORDS = {
+    "extra_forbidden": "unknown key",
+    "missing": "is missing",
+    "model_type": "must be a section (`key: value` lines below it)",
+    "dict_type": "must be a section (`key: value` lines below it)",
+    "tuple_type": "must be a list",
+    "too_long": "holds too many items",
+    "too_short": "holds too few items",
+    "string_type": "must be text",
+    "string_pattern_mismatch": "must be a name of letters, digits, `-` and `_`",
+    "float_type": "must be a number",
+    "int_type": "must be a whole number",
+}
+_CURES = {
+    "tuple_type": "write `- ITEM` lines",
+    "string_type": "put it in quotes",
+    "float_type": "write it without quotes or unit",
+    "int_type": "write it without quotes or unit",
+}
+
+
+def load(path: Path) -> Config:
+    """Read, check and resolve the settings.
+
+    Secrets are left unresolved: see `Config.channel_url`.
+
+    Raises `ConfigError` with one line for each problem, `FILE:LINE: key: what is wrong (cure)`.
+    """
+    document, problems = _with_lower_gliders(read(Path(path)))
+    if document.data is None and not problems:
+        raise ConfigError(f"{path}:1: the file is empty (copy config/gliderwatch.yml and edit it)")
+    presets = _presets()
+    problems += _unknown_names(document, presets)
+    problems += _empty_ranges(document, presets)
+    config = None
+    try:
+        config = Config.model_validate(document.data, context={"base": document.path.absolute().parent})
+    except ValidationError as error:
+        problems += _explain(error, Config, document)
+    if config is None or problems:  # not raised above: a traceback must not show what pydantic saw
+        raise ConfigError(_listed(problems))
+    return config.bound_to(document, presets)
+
+
+def presets_path() -> Path:
+    """The presets file: beside this module in a wheel, in `config/` of a checkout."""
+    installed = Path(__file__).with_name("presets.yml")
+    return installed if installed.is_file() else Path(__file__).parents[3] / "config" / "presets.yml"
+
+
+def _presets() -> Mapping[str, Preset]:
+    document = read(presets_path())
+    problems = list(document.problems)
+    presets: dict[str, Preset] = {}
+    try:
+        presets = TypeAdapter(_PRESETS).validate_python(document.data or {})
+    except ValidationError as error:
+        problems += _explain(error, _PRESETS, document)
+    if problems:
+        raise ConfigError(_listed(problems))
+    return presets
+
+
+def _listed(problems: Iterable[Problem]) -> str:
+    """Problems one per line, in the order of the file."""
+    lines = {str(problem): int(problem.where.rpartition(":")[2]) for problem in problems}
+    return "\n".join(sorted(lines, key=lambda text: lines[text]))
+
+
+def _with_lower_gliders(document: Document) -> tuple[Document, list[Problem]]:
+    """The document with the names of gliders in lower case; two names that become one are a problem."""
+    problems = list(document.problems)
+    gliders: dict[str, Any] = {}
+    for name, settings in _section(document, "gliders").items():
+        if name.lower() in gliders:
+            problems.append(document.error(("gliders", name), "given twice (case aside)", "keep one"))
+        gliders.setdefault(name.lower(), settings)
+    if not gliders:
+        return document, problems
+    lines: dict[str, int] = {}
+    for key, line in document.lines.items():
+        parts = key.split(".")
+        if parts[0] == "gliders" and len(parts) > 1:
+            parts[1] = parts[1].lower()
+        lines.setdefault(".".join(parts), line)
+    return replace(document, data={**document.data, "gliders": gliders}, lines=lines), problems
+
+
+def _section(document: Document, name: str) -> dict[str, Any]:
+    data = document.data.get(name) if isinstance(document.data, dict) else None
+    return data if isinstance(data, dict) else {}
+
+
+def _explain(error: ValidationError, root: Any, document: Document) -> Iterator[Problem]:
+    """The findings of pydantic in the user's words; what was found is not repeated."""
+    for found in error.errors(include_url=False, include_input=False):
+        kind = found["type"]
+        parts = [str(part) for part in found["loc"] if part != "[key]"]
+        text = _WORDS.get(kind) or found["msg"].removeprefix("Value error, ")
+        text = text.replace("Input should be", "must be").replace("String should", "must")
+        cure = _CURES.get(kind, "")
+        if kind == "extra_forbidden":
+            cure = nearest(parts[-1], _known_keys(root, parts[:-1]))
+        elif kind == "missing":
+            cure = "write two numbers" if parts[-1].isdigit() else f"add `{parts[-1]}:`"
+        yield document.error(parts, text, cure)
+
+
+def _known_keys(annotation: Any, parts: list[str]) -> list[str]:
+    """The keys of the section at a place."""
+    for part in parts:
+        if get_origin(annotation) is dict:
+            annotation = get_args(annotation)[1]
+        else:
+            annotation = annotation.model_fields[part].annotation
+    return list(annotation.model_fields) if issubclass(annotation, Section) else []
+
+
+def _unknown_names(document: Document, presets: Mapping[str, Preset]) -> Iterator[Problem]:
+    """Names of channels, gliders and presets that are not there."""
+    gliders, channels = _section(document, "gliders"), _section(document, "channels")
+    for name, recipient in _section(document, "recipients").items():
+        for key, section, known in (
+            ("channels", "channels", channels),
+            ("gliders", "gliders", gliders),
+            ("surfacing", "gliders", gliders),
+        ):
+            items = recipient.get(key) if isinstance(recipient, dict) else None
+            for i, item in enumerate(items if isinstance(items, list) else ()):
+                word = item.lower() if section == "gliders" and isinstance(item, str) else item
+                if isinstance(word, str) and word not in known:
+                    cure = nearest(word, known) or f"add it under `{section}`"
+                    text = f"`{shown(item)}` is not under `{section}`"
+                    yield document.error(("recipients", name, key, str(i)), text, cure)
+    for parts, settings in _settings(document):
+        preset = settings.get("preset")
+        if isinstance(preset, str) and preset not in presets:
+            cure = nearest(preset, presets) or "remove it"
+            yield document.error((*parts, "preset"), f"there is no preset `{shown(preset)}`", cure)
+
+
+def _settings(document: Document) -> Iterator[tuple[tuple[str, ...], dict[str, Any]]]:
+    """The defaults and each glider's settings, with their place."""
+    yield ("defaults",), _section(document, "defaults")
+    for name, settings in _section(document, "gliders").items():
+        yield ("gliders", name), settings if isinstance(settings, dict) else {}
+
+
+def _empty_ranges(document: Document, presets: Mapping[str, Preset]) -> Iterator[Problem]:
+    """Ranges of speed that are empty once presets and defaults are counted in."""
+    defaults = _section(document, "defaults")
+    for parts, settings in _settings(document):
+        if not settings.keys() & {"normal_speed", "preset"}:
+            continue  # as the defaults, which have their own line
+        preset = presets.get(str(settings.get("preset") or defaults.get("preset")), Preset())
+        speed = preset.normal_speed.model_dump()
+        for layer in (defaults, settings):
+            given = layer.get("normal_speed")
+            speed |= given if isinstance(given, dict) else {}
+        low, high = speed["min"], speed["max"]
+        if isinstance(low, int | float) and isinstance(high, int | float) and low >= high:
+            text = f"min {low:g} must be below max {high:g} m/s"
+            yield document.error((*parts, "normal_speed"), text, "what is left out comes from the defaults")

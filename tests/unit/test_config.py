@@ -1,0 +1,234 @@
+"""Settings: what loads, who wins, and where each key stands."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from gliderwatch.config import Config, load
+from gliderwatch.config.loading import presets_path
+from gliderwatch.config.sections import Anomaly, Estimator, FalseAlarm
+from gliderwatch.errors import ConfigError
+from gliderwatch.model import Severity
+from gliderwatch.params import AnomalyRule, EstimatorParams, FalseAlarmRule, GliderParams
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "config" / "gliderwatch.yml"
+MINIMAL = "dockserver: {roots: [/data]}\n"
+Write = Callable[[str], Path]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    def _write(text: str) -> Path:
+        path = tmp_path / "c.yml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return _write
+
+
+@pytest.fixture
+def presets(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Write:
+    def _presets(text: str) -> Path:
+        path = tmp_path / "presets.yml"
+        path.write_text(text, encoding="utf-8")
+        monkeypatch.setattr("gliderwatch.config.loading.presets_path", lambda: path)
+        return path
+
+    return _presets
+
+
+def problems(path: Path) -> list[str]:
+    """The lines of the error without the folder of the file."""
+    with pytest.raises(ConfigError) as caught:
+        load(path)
+    return [line.removeprefix(f"{path.parent}/") for line in str(caught.value).splitlines()]
+
+
+# --------------------------------------------------------------------------- what loads
+
+
+def test_minimal_file_has_the_documented_defaults(write: Write) -> None:
+    config = load(write(MINIMAL))
+    dockserver = config.dockserver
+    assert dockserver.roots == ("/data",)
+    assert (dockserver.settle_seconds, dockserver.rescan_seconds, dockserver.observer) == (60, 300, "inotify")
+    assert config.defaults_params() == GliderParams()
+    assert (config.gliders, config.channels, config.recipients) == ({}, {}, {})
+
+
+def test_built_in_gains_are_those_of_franklin_with_a_threshold_that_can_be_exceeded(write: Write) -> None:
+    params = load(write(MINIMAL)).glider("electa")
+    estimator = params.estimator
+    assert (estimator.sigma, estimator.k, estimator.gamma) == (13e3, 0.003, 5e-7)
+    assert (estimator.kernel, estimator.gamma_f, estimator.speed_gain) == ("exponential", 0.3, None)
+    assert (params.speed_min, params.speed_max) == (0.15, 0.75)
+
+
+def test_shipped_example_loads() -> None:
+    config = load(EXAMPLE)
+    assert set(config.gliders) == {"electa", "unit_595"}
+    assert config.glider("electa") == GliderParams()
+    assert config.glider("unit_595").speed_max == 0.30
+
+
+def test_sections_and_lists_without_lines_count_as_left_out(write: Write) -> None:
+    text = (
+        MINIMAL.replace("]}", "], cache: }")
+        + "state:\ndefaults:\ngliders:\n  electa:\nchannels:\nrecipients:\n"
+    )
+    config = load(write(text))
+    assert config.dockserver.cache == ()
+    assert config.glider("electa") == GliderParams()
+
+
+def test_paths_start_at_the_folder_of_the_file(write: Write, tmp_path: Path) -> None:
+    config = load(write("dockserver: {roots: [gliders, '../*/x']}\nstate: {path: state.sqlite}\n"))
+    assert config.dockserver.roots == (f"{tmp_path}/gliders", f"{tmp_path.parent}/*/x")
+    assert config.state.path == f"{tmp_path}/state.sqlite"
+
+
+def test_paths_in_the_home_folder(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", "/home/pilot")
+    assert load(write("dockserver: {roots: [~/gliders]}")).dockserver.roots == ("/home/pilot/gliders",)
+
+
+def test_names_of_gliders_are_matched_in_lower_case_and_may_look_like_other_things(write: Write) -> None:
+    text = MINIMAL + (
+        "gliders:\n  Electa: {normal_speed: {max: 0.4}}\n  2024:\n  null:\n"
+        "channels: {a: {url: 'json://h'}}\n"
+        "recipients: {p: {channels: [a], gliders: [ELECTA, '2024'], surfacing: [eleCta]}}\n"
+    )
+    config = load(write(text))
+    assert set(config.gliders) == {"electa", "2024", "null"}
+    assert config.glider("ELECTA").speed_max == 0.4
+    assert config.recipients["p"].gliders == ("electa", "2024")
+    assert config.recipients["p"].surfacing == ("electa",)
+
+
+def test_recipients(write: Write) -> None:
+    text = MINIMAL + (
+        "channels: {a: {url: 'json://h'}}\n"
+        "recipients: {all: {channels: [a]}, loud: {channels: [a], gliders: [], min_severity: critical}}\n"
+    )
+    everyone, loud = load(write(text)).recipients.values()
+    assert (everyone.gliders, everyone.min_severity, everyone.surfacing) == (None, Severity.WARNING, ())
+    assert (loud.gliders, loud.min_severity) == ((), Severity.CRITICAL)
+
+
+def test_config_is_frozen(write: Write) -> None:
+    with pytest.raises(ValueError, match="frozen"):
+        load(write(MINIMAL)).dockserver.settle_seconds = 1.0  # type: ignore[misc]
+
+
+# --------------------------------------------------------------------------- who wins
+
+
+LAYERED = (
+    MINIMAL
+    + """\
+defaults:
+  preset: slow
+  estimator: {k: 0.004, sigma: 2.0e+3}
+  rules: {anomaly: {open_after: 3}}
+gliders:
+  plain:
+  own:
+    normal_speed: {max: 0.4}
+    estimator: {k: 0.005, speed_gain: null, centres: [[27, -83.5]]}
+    rules: {anomaly: {clear_after: 5}, reminder_hours: null}
+  other: {preset: fast, normal_speed: {min: 0.5}}
+"""
+)
+TWO_PRESETS = """\
+slow:
+  normal_speed: {min: 0.1, max: 0.2}
+  estimator: {k: 0.001, gamma: 1.0e-6, speed_gain: 2.0e-6, gamma_f: 0.5}
+fast: {normal_speed: {min: 0.4, max: 0.9}, estimator: {nu: 1, kernel: gaussian}}
+"""
+
+
+def test_precedence(write: Write, presets: Write) -> None:
+    presets(TWO_PRESETS)
+    config = load(write(LAYERED))
+    plain, own, other = (config.glider(name) for name in ("plain", "own", "other"))
+    assert plain == config.defaults_params() == config.glider("never-heard-of")
+
+    # built-in < preset < defaults
+    assert (plain.speed_min, plain.speed_max) == (0.1, 0.2)
+    assert plain.estimator == EstimatorParams(sigma=2e3, k=0.004, gamma=1e-6, speed_gain=2e-6, gamma_f=0.5)
+    assert plain.rules.anomaly == AnomalyRule(open_after=3)
+
+    # < glider, key by key; null is a value
+    assert (own.speed_min, own.speed_max) == (0.1, 0.4)
+    assert (own.estimator.k, own.estimator.sigma, own.estimator.gamma) == (0.005, 2e3, 1e-6)
+    assert own.estimator.speed_gain is None
+    assert own.estimator.centres == ((27.0, -83.5),)
+    assert own.rules.anomaly == AnomalyRule(open_after=3, clear_after=5)
+    assert own.rules.reminder_hours is None
+
+    # the glider's preset replaces that of the defaults, whose explicit keys win over either
+    assert (other.speed_min, other.speed_max) == (0.5, 0.9)
+    assert other.estimator == EstimatorParams(kernel="gaussian", sigma=2e3, k=0.004, nu=1.0)
+
+
+def test_every_parameter_has_its_key() -> None:
+    for section, params in (
+        (Estimator, EstimatorParams),
+        (Anomaly, AnomalyRule),
+        (FalseAlarm, FalseAlarmRule),
+    ):
+        assert set(section.model_fields) == {field.name for field in fields(params)}
+        assert params(**dict(section())) == params()
+
+
+def test_no_presets(write: Write, presets: Write) -> None:
+    presets("# none yet\n")
+    assert load(write(MINIMAL)).defaults_params() == GliderParams()
+    assert problems(write(MINIMAL + "defaults: {preset: x}\n")) == [
+        "c.yml:2: defaults.preset: there is no preset `x` (remove it)"
+    ]
+
+
+def test_a_broken_presets_file_is_named(write: Write, presets: Write) -> None:
+    presets("slow:\n  estimator: {sgma: 3}\n")
+    assert problems(write(MINIMAL)) == [
+        "presets.yml:2: slow.estimator.sgma: unknown key (did you mean `sigma`?)"
+    ]
+
+
+def test_every_shipped_preset_loads(write: Write) -> None:
+    assert presets_path() == EXAMPLE.with_name("presets.yml")
+    config = load(write(MINIMAL + "defaults: {preset: franklin}\n"))
+    assert set(config._presets) == {"franklin", "usf-sam", "usf-gansett", "usf-stella"}
+    assert (config.defaults_params().speed_min, config.defaults_params().speed_max) == (0.15, 0.25)
+
+
+def test_locate_gives_the_line_of_a_key_or_of_what_it_belongs_to(write: Write) -> None:
+    config = load(write("dockserver:\n  roots:\n  - /a\n  - /b\ngliders:\n  Electa:\n    rules: {}\n"))
+    lines = {
+        key: config.locate(key) for key in ("dockserver.roots.1", "gliders.electa", "gliders.electa.rules")
+    }
+    assert list(lines.values()) == [4, 6, 7]
+    assert config.locate("gliders.electa.rules.anomaly.open_after") == 7
+    assert config.locate("recipients") == 1
+
+
+def test_loading_does_not_load_apprise(write: Write) -> None:
+    code = (
+        "import sys; from gliderwatch.config import load; load(sys.argv[1]); print('apprise' in sys.modules)"
+    )
+    command = [sys.executable, "-c", code, str(write(MINIMAL))]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
+
+
+def test_a_config_made_without_a_file_works() -> None:
+    config = Config.model_validate({"dockserver": {"roots": ["/data"]}})
+    assert config.glider("electa") == GliderParams()
+    assert config.locate("dockserver.roots") == 1
