@@ -39,7 +39,7 @@ test: $(VENV)/installed ## run all tests; those that measure time first and alon
 	exit $$failed
 
 demo: $(VENV)/installed ## a small dockserver, a faulty glider, the daemon, and the alert as it arrives
-	$(BIN)/python -m gliderwatch.demo
+	$(BIN)/python demo/demo.py
 
 lint: $(VENV)/installed ## ruff: rules and format
 	$(BIN)/ruff check .
