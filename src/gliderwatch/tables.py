@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from gliderwatch.alerts.words import clean, duration, place, utc
+from gliderwatch.alerts.words import clean, utc
 from gliderwatch.config import Problem
 from gliderwatch.model import Assessment, Flag, Severity
 from gliderwatch.run.lines import iso
@@ -73,10 +73,12 @@ def files(counts: dict[Status, int], left_out: Sequence[File], console: Console,
 
 def status(view: Overview, console: Console) -> None:
     """The overview of a running service."""
-    silent = "never gave a sign of life" if view.silent_for is None else duration(view.silent_for) + " ago"
+    silent = "never" if view.silent_for is None else f"{view.silent_for:.0f} s ago"
     state = "[green]alive[/]" if view.alive else "[bold red]NOT RUNNING[/]"
     console.print(f"gliderwatch is {state} (last sign of life: {silent})")
-    table = Table("glider", "surfaced (UTC)", "place", "flag", box=None, pad_edge=False, header_style="bold")
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in ("glider", "surfaced (UTC)", "lat lon", "flag"):
+        table.add_column(name, no_wrap=True)
     for name in ("speed", "range", "dives"):
         table.add_column(name, justify="right", no_wrap=True)
     for glider in view.gliders:
@@ -102,7 +104,7 @@ def _glider(g: GliderStatus) -> list[str]:
     a = g.latest
     if a is None:
         return [name, "[dim]no dive yet[/]", "", "", "", "", str(g.dives)]
-    where = place(a.lat, a.lon).split(" (")[0]
+    where = "" if a.lat is None or a.lon is None else f"{a.lat:.4f} {a.lon:.4f}"
     speeds = f"{a.speed_min:.2f}-{a.speed_max:.2f}"
     return [
         name,
