@@ -127,11 +127,9 @@ def _caches(config: Config) -> _Findings:
 
 def _state(config: Config) -> _Findings:
     key, path = "state.path", Path(config.state.path)
-    folder = path.parent
+    folder = next(parent for parent in path.parents if is_folder(parent))  # the daemon makes the rest
     if is_folder(path):
         yield _error(key, f"{path} is a folder", "name a file in it")
-    elif not is_folder(folder):
-        yield _error(key, f"the folder {folder} is not there", "create it, owned by the user of the service")
     elif not os.access(folder, os.W_OK | os.X_OK) or (
         os.access(path, os.F_OK) and not os.access(path, os.W_OK)
     ):
