@@ -1,0 +1,1 @@
+"""Is the speed abnormal, and can the estimate be believed? Pure."""

@@ -16,7 +16,7 @@ from gliderwatch.model import Alert, Assessment, Incident
 
 NEWS = 86400.0
 """Seconds: an incident that was over for longer when it became known is history, not news."""
-SPEED_CHANGE = 0.02
+SPEED_CHANGE = 0.05
 """m/s: a smaller change of a speed that was told is not worth a correction."""
 FLOW_CHANGE = 0.05
 """m/s: the same for the reference flow."""
@@ -113,7 +113,7 @@ def _begun(incident: Incident, known: Known, taken: set[str]) -> tuple[Thread, l
     identity = incident.id
     while identity in taken:
         identity += "+"
-    alert = message.opened(incident, incident.last, alert_id=f"{identity}/0", audience=incident.severity)
+    alert = message.opened(incident, incident.last, alert_id=identity, audience=incident.severity)
     alerts = [replace(alert, incident=identity)]
     thread = Thread(identity, incident, incident.last, 1)
     if incident.cleared_at is not None:

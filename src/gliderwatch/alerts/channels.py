@@ -1,0 +1,297 @@
+"""Channels: one Apprise URL each, one message at a time, and nothing but a clear success counts.
+
+Apprise is imported on first use and never at import of this module: it takes a fifth of a second and
+35 MB, which `gliderwatch status` need not spend.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+import smtplib
+import socket
+import ssl
+import threading
+from contextlib import suppress
+from email.errors import MessageError
+from typing import Any
+from urllib.parse import parse_qs, unquote, urlsplit
+
+from gliderwatch.alerts.mail import Envelope, compose
+from gliderwatch.errors import GliderwatchError
+from gliderwatch.model import Alert, Kind, Severity
+
+READ_TIMEOUT = 15.0
+"""Seconds to wait for an answer where the URL does not say (``rto=``): a message taken but not
+confirmed in time is sent again, so that Apprise's 4 s would make duplicates at a slow service."""
+
+HIDDEN = "***"
+
+OPEN_KEYS = frozenset(
+    {"smtp", "mode", "from", "to", "cc", "name", "format", "overflow", "cto", "rto", "verify"}
+)
+"""Keys of a URL's query whose values are no secrets and tell what failed."""
+
+
+class DeliveryError(GliderwatchError):
+    """A message was not surely delivered. The text holds no secret of the channel's URL."""
+
+
+class Channel:
+    """One way to reach people. Not for use by several threads at once."""
+
+    def __init__(self, name: str, url: str) -> None:
+        self.name = name
+        self._url = url
+        self._service: Any = None
+        self._accepted: dict[str, set[str]] = {}
+
+    def __repr__(self) -> str:
+        return f"Channel({self.name!r})"
+
+    def prepare(self) -> None:
+        """Load Apprise and read the URL, so that the first alert need not wait for it.
+
+        Raises DeliveryError when the URL cannot be used.
+        """
+        if self._service is None:
+            self._service, _ = _service(self._url)
+
+    def send(self, alert: Alert) -> None:
+        """Deliver one alert; raises DeliveryError unless it surely was."""
+        self.prepare()
+        try:
+            if _is_mail(self._service):
+                self._send_mail(alert)
+            else:
+                _notify(self._service, alert)
+        except DeliveryError as error:
+            raise DeliveryError(scrub(str(error), self._url)) from None
+
+    def _send_mail(self, alert: Alert) -> None:
+        """Deliver to every recipient; those who accepted it are not asked again at the next try."""
+        envelope = _envelope(self._service)
+        accepted = self._accepted.setdefault(alert.id, set())
+        rest = [address for address in envelope.recipients if address not in accepted]
+        if not rest:
+            raise DeliveryError("the URL names no valid address to send to")
+        refused = _submit(self._service, alert, envelope, rest)
+        accepted.update(set(rest) - set(refused))
+        if refused:
+            raise DeliveryError(
+                f"mail server refused {len(refused)} of {len(rest)} recipients: {_first(refused)}"
+            )
+        self._accepted.pop(alert.id, None)
+
+
+def problem(url: str) -> str | None:
+    """What is wrong with a channel's URL, in words without secrets; None when it can be used.
+
+    It may be usable and still have one: of three addresses one that Apprise drops as invalid.
+    """
+    try:
+        service, warnings = _service(url)
+    except DeliveryError as error:
+        return str(error)
+    dropped = _dropped(service, url) if _is_mail(service) else []
+    return "; ".join([*warnings, *dropped]) or None
+
+
+def _dropped(service: Any, url: str) -> list[str]:
+    """What stands for an address in the URL of a mail channel but is none: Apprise leaves it out silently."""
+    taken = [address.lower() for address in _envelope(service).recipients]
+    given = parse_qs(url.partition("?")[2])
+    parts = [
+        part.strip()
+        for key in ("to", "cc", "bcc")
+        for value in given.get(key, [])
+        for part in re.split("[,;]", value)
+    ]
+    return [
+        f"{part!r} is no mail address" for part in parts if part and not any(a in part.lower() for a in taken)
+    ]
+
+
+def scrub(text: str, url: str) -> str:
+    """`text` without any part of `url` that may be secret: user, password, path, query, a token as host."""
+    for secret in sorted(_secrets(url), key=len, reverse=True):
+        text = re.sub(re.escape(secret), HIDDEN, text, flags=re.IGNORECASE)
+    return text
+
+
+def _secrets(url: str) -> set[str]:
+    scheme, _, rest = url.partition("://")
+    try:
+        parts = urlsplit(f"//{rest}")
+        login, host = parts.netloc.rpartition("@")[::2]
+        path, query = parts.path, parts.query
+    except ValueError:
+        login, host, path, query = rest, "", "", ""
+    found = {login, *login.split(":", 1), *(p for p in path.split("/") if len(p) > 3)}
+    pairs = (pair.partition("=")[::2] for pair in query.split("&"))
+    found |= {value for key, value in pairs if key not in OPEN_KEYS and len(value) > 3}
+    name = host.partition(":")[0]
+    if "." not in name and name.lower() != "localhost" and not host.startswith("["):
+        found.add(name)  # services such as Slack have a token where others have their host
+    found |= {unquote(secret) for secret in found}
+    return {secret for secret in found if secret and secret != scheme}
+
+
+class _Warnings(logging.Handler):
+    """Keeps what Apprise warns of in this thread while it reads a URL, such as an address it drops."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.texts: list[str] = []
+        self._thread = threading.get_ident()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep the text of one warning."""
+        if record.thread == self._thread:
+            self.texts.append(record.getMessage())
+
+
+def _service(url: str) -> tuple[Any, tuple[str, ...]]:
+    """The Apprise plugin of a URL and what Apprise warned of, scrubbed.
+
+    Raises DeliveryError with Apprise's reason where there is none.
+    """
+    import apprise  # noqa: PLC0415  (slow: see the module's docstring)
+
+    logger = _quiet()
+    asset = apprise.AppriseAsset(
+        app_id="gliderwatch", app_desc="gliderwatch", app_url="", service_timeout=0, storage_mode="memory"
+    )
+    warnings = _Warnings()
+    logger.addHandler(warnings)
+    try:
+        service = apprise.Apprise.instantiate(url, asset=asset, suppress_exceptions=False)
+    except Exception as error:  # plugins raise what they like on a bad URL
+        warnings.texts.append(str(error) or type(error).__name__)
+        service = None
+    finally:
+        logger.removeHandler(warnings)
+    told = tuple(dict.fromkeys(scrub(text, url) for text in warnings.texts))
+    if service is None:
+        reason = "; ".join(told) or "no service known for it"
+        raise DeliveryError(f"not an Apprise URL that can be used: {reason}")
+    if "rto=" not in url:
+        service.socket_read_timeout = READ_TIMEOUT
+    if "overflow=" not in url:
+        service.overflow_mode = apprise.OverflowMode.TRUNCATE  # a cut alert says more than a refused one
+    return service, told
+
+
+def _quiet() -> logging.Logger:
+    """Keep the loggers of Apprise and of its HTTP client to themselves: their lines can hold URLs."""
+    for name in ("apprise", "urllib3"):
+        logger = logging.getLogger(name)
+        logger.setLevel(logging.WARNING)
+        logger.propagate = False
+    return logging.getLogger("apprise")
+
+
+def _is_mail(service: Any) -> bool:
+    from apprise.plugins.email import NotifyEmail  # noqa: PLC0415
+
+    return type(service) is NotifyEmail and service.pgp_mode == "no"
+
+
+def _notify(service: Any, alert: Alert) -> None:
+    """Send by Apprise. Text is declared as text, which Apprise escapes as each service needs it."""
+    import apprise  # noqa: PLC0415
+
+    one = apprise.Apprise()
+    one.add(service)
+    try:
+        result = one.notify(
+            body=alert.body,
+            title=alert.title,
+            notify_type=_notify_type(alert),
+            body_format=apprise.NotifyFormat.TEXT,
+        )
+    except Exception as error:  # a plugin may raise anything: all of it means not delivered
+        raise DeliveryError(f"{service.service_name}: {type(error).__name__}") from None
+    # `optional=yes` in a URL turns a failure into a success of the result, but not of its attempts
+    sent = result.status == apprise.AppriseResultStatus.SUCCESS
+    if sent and result.results and all(any(r.attempts) for r in result.results):
+        return
+    reasons = "; ".join(dict.fromkeys(entry.message for entry in result.logs()))
+    raise DeliveryError(f"{service.service_name}: {reasons or result.status.name.lower()}")
+
+
+def _notify_type(alert: Alert) -> str:
+    if alert.kind is Kind.ALL_CLEAR:
+        return "success"
+    return {Severity.INFO: "info", Severity.WARNING: "warning", Severity.CRITICAL: "failure"}[alert.severity]
+
+
+def _envelope(service: Any) -> Envelope:
+    def person(address: str) -> tuple[str, str]:
+        return (service.names.get(address) or "", address)
+
+    return Envelope(
+        sender=(service.from_addr[0] or "gliderwatch", service.from_addr[1]),
+        to=[(name or "", address) for name, address in service.targets],
+        cc=[person(address) for address in sorted(service.cc)],
+        bcc=sorted(service.bcc),
+        reply_to=[person(address) for address in sorted(service.reply_to)],
+        headers=service.headers,
+    )
+
+
+def _submit(
+    service: Any, alert: Alert, envelope: Envelope, recipients: list[str]
+) -> dict[str, tuple[int, bytes]]:
+    """Hand the mail to the server; returns who was refused. Raises DeliveryError when nobody was served."""
+    server = f"mail server {service.smtp_host}:{service.port}"
+    try:
+        mail = compose(alert, envelope)
+        smtp = _connect(service)
+        try:
+            return smtp.send_message(mail, envelope.sender[1], recipients)
+        finally:
+            # once the server took the message, a lost goodbye must not send it again
+            with suppress(OSError, smtplib.SMTPException):
+                smtp.quit()
+            smtp.close()
+    except smtplib.SMTPRecipientsRefused as error:
+        return error.recipients
+    except smtplib.SMTPResponseException as error:
+        raise DeliveryError(f"{server}: {error.smtp_code} {_decode(error.smtp_error)}") from None
+    except (OSError, smtplib.SMTPException, ValueError, MessageError) as error:
+        raise DeliveryError(f"{server}: {str(error) or type(error).__name__}") from None
+
+
+def _connect(service: Any) -> smtplib.SMTP:
+    """A connection as the URL asks for it, logged in."""
+    context = ssl.create_default_context()
+    if not service.verify_certificate:
+        context.check_hostname = False
+        context.verify_mode = ssl.CERT_NONE
+    timeout = service.socket_connect_timeout
+    name = socket.gethostname()  # without it smtplib asks the DNS for our own name, which may hang
+    if service.secure_mode == "ssl":
+        smtp: smtplib.SMTP = smtplib.SMTP_SSL(
+            service.smtp_host, service.port, name, timeout=timeout, context=context
+        )
+    else:
+        smtp = smtplib.SMTP(service.smtp_host, service.port, name, timeout=timeout)
+    try:
+        if service.secure_mode == "starttls":
+            smtp.starttls(context=context)
+        if service.user and service.password:
+            smtp.login(service.user, service.password)
+    except BaseException:
+        smtp.close()
+        raise
+    return smtp
+
+
+def _first(refused: dict[str, tuple[int, bytes]]) -> str:
+    code, text = next(iter(refused.values()))
+    return f"{code} {_decode(text)}"
+
+
+def _decode(text: bytes | str) -> str:
+    return " ".join((text.decode("utf-8", "replace") if isinstance(text, bytes) else text).split())

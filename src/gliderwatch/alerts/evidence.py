@@ -1,0 +1,255 @@
+"""What speaks for and against a flag, how sure it is, and what a pilot can check. Pure.
+
+A remark points to one of three things: the ``glider`` (it really flies out of its range), the
+``data`` (fix, compass, reference flow or sampling may mislead), or ``normal`` flight. For flag 1 the
+first speaks for it and the others against; for flag 2 it is the other way round.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import degrees, hypot
+from typing import Literal
+
+from gliderwatch.alerts.words import angle, clean, known, speed, utc
+from gliderwatch.model import Assessment, Incident, Kind
+
+# Bounds above (or below) which a number is worth a line; they change no flag.
+MISFIT = 0.05  # m/s across the heading; a few mm/s to 2 cm/s when fixes, compass and current agree
+ROLL = 15.0  # degrees
+PITCH_DIFFERENCE = 5.0  # degrees between dive and climb
+RATE_RATIO = 1.5  # between descent and climb
+STEADY = 0.98  # length of the mean heading vector
+SHORT_DIVE = 1.0  # h
+DRIFT = 0.5  # h
+FIX_GAP = 15.0  # min
+UNOBSERVED = 0.1  # h
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """One sentence and what it points to."""
+
+    points_to: Literal["glider", "data", "normal"]
+    text: str
+
+
+def weigh(assessment: Assessment, kind: Kind) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What speaks for and what against an incident of `kind`, from one dive."""
+    remarks = [
+        remark
+        for rule in (
+            _agreement,
+            _closure,
+            _along,
+            _onboard,
+            _before,
+            _roll,
+            _pitch,
+            _rates,
+            _reference,
+            _coverage,
+        )
+        for remark in rule(assessment)
+    ]
+    remarks += [Remark("data", f"data: {clean(note)}") for note in assessment.notes]
+    glider = tuple(r.text for r in remarks if r.points_to == "glider")
+    other = tuple(r.text for r in remarks if r.points_to != "glider")
+    return (other, glider) if kind is Kind.FALSE_ALARM else (glider, other)
+
+
+def out_of_range(assessment: Assessment, value: float | None) -> bool:
+    """Whether a speed (m/s) is known and outside the glider's normal range."""
+    value = known(value)
+    return value is not None and not assessment.speed_min <= value <= assessment.speed_max
+
+
+def difference(assessment: Assessment) -> float | None:
+    """Length of learnt flow less reference flow (m/s), None where one of them is missing."""
+    a = assessment
+    u, v, ru, rv = (known(x) for x in (a.flow_u, a.flow_v, a.reference_u, a.reference_v))
+    return None if u is None or v is None or ru is None or rv is None else hypot(u - ru, v - rv)
+
+
+def _number(assessment: Assessment, name: str) -> float | None:
+    return known(assessment.evidence.get(name))
+
+
+def _agreement(a: Assessment) -> list[Remark]:
+    p_e, apart = known(a.p_e), difference(a)
+    if p_e is None or apart is None:
+        return []
+    agree = p_e <= a.gamma_f
+    words = f"learnt flow and reference {'agree' if agree else 'disagree'}: {speed(apart)} apart"
+    return [Remark("glider" if agree else "data", f"{words}, p_E {p_e:.3f} (limit {a.gamma_f:.3f})")]
+
+
+def _closure(a: Assessment) -> list[Remark]:
+    misfit = _number(a, "across_misfit")
+    if misfit is None:
+        return []
+    if abs(misfit) > MISFIT:
+        cause = "reference current, compass or a fix is wrong, which a slow glider cannot cause"
+        return [Remark("data", f"across the heading the track misses by {speed(abs(misfit))}: {cause}")]
+    return [
+        Remark(
+            "glider",
+            f"fixes, compass and current fit together: {speed(abs(misfit))} misfit across the heading",
+        )
+    ]
+
+
+def _along(a: Assessment) -> list[Remark]:
+    value, misfit = _number(a, "along_speed"), _number(a, "across_misfit")
+    if value is None or (misfit is not None and abs(misfit) > MISFIT):
+        return []
+    return [_speed_remark(a, value, "ground velocity less current gives {} along the heading")]
+
+
+def _onboard(a: Assessment) -> list[Remark]:
+    value = _number(a, "onboard_speed")
+    return [] if value is None else [_speed_remark(a, value, "the glider itself reports {}")]
+
+
+def _speed_remark(a: Assessment, value: float, words: str) -> Remark:
+    if out_of_range(a, value):
+        return Remark("glider", f"{words.format(speed(value))}, out of the normal range")
+    return Remark("normal", f"{words.format(speed(value))}, within the normal range")
+
+
+def _before(a: Assessment) -> list[Remark]:
+    before, now = _number(a, "speed_before"), known(a.speed)
+    if before is None or now is None or not out_of_range(a, now):
+        return []
+    if out_of_range(a, before):
+        return [Remark("glider", f"the dive before was out of range too: {speed(before)}")]
+    return [Remark("glider", f"the dive before was normal: {speed(before)}, then {speed(now)}")]
+
+
+def _roll(a: Assessment) -> list[Remark]:
+    roll = _number(a, "roll_mean")
+    if roll is None or abs(degrees(roll)) <= ROLL:
+        return []
+    return [
+        Remark("glider", f"mean roll {angle(roll)}, more than {ROLL:.0f}: a lost wing or a load on one side")
+    ]
+
+
+def _pitch(a: Assessment) -> list[Remark]:
+    down, up = _number(a, "pitch_dive"), _number(a, "pitch_climb")
+    if down is None or up is None or abs(degrees(abs(down) - abs(up))) <= PITCH_DIFFERENCE:
+        return []
+    return [Remark("glider", f"pitch differs between dive ({angle(down)}) and climb ({angle(up)})")]
+
+
+def _rates(a: Assessment) -> list[Remark]:
+    down, up = _number(a, "depth_rate_dive"), _number(a, "depth_rate_climb")
+    if not down or not up:
+        return []
+    down, up = abs(down), abs(up)
+    if max(down, up) / min(down, up) <= RATE_RATIO:
+        return []
+    return [Remark("glider", f"dives at {speed(down)} but climbs at {speed(up)} (vertical)")]
+
+
+def _reference(a: Assessment) -> list[Remark]:
+    if known(a.reference_u) is None or known(a.reference_v) is None:
+        return [Remark("data", "no reference flow for this dive")]
+    if not a.reference_final:
+        return [
+            Remark("data", "the reference current is provisional: its final value comes with a later file")
+        ]
+    return []
+
+
+def _coverage(a: Assessment) -> list[Remark]:
+    """Sampling of the dive: how much of it the numbers rest on."""
+    lines: tuple[tuple[str, Callable[[float], bool], str], ...] = (
+        (
+            "heading_steadiness",
+            lambda x: x > STEADY,
+            "heading hardly changed (steadiness {:.2f}): a slow glider looks like a head current",
+        ),
+        ("duration_h", lambda x: x < SHORT_DIVE, "short dive ({:.1f} h): errors of the fixes weigh more"),
+        ("unobserved_h", lambda x: x > UNOBSERVED, "{:.1f} h of the dive are missing from the data"),
+        ("drift_h", lambda x: x > DRIFT, "{:.1f} h of surface drift between the fixes"),
+        ("fix_gap_minutes", lambda x: x > FIX_GAP, "{:.0f} min between surfacing and fix"),
+    )
+    values = ((_number(a, name), worth, words) for name, worth, words in lines)
+    return [Remark("data", words.format(x)) for x, worth, words in values if x is not None and worth(x)]
+
+
+def how_sure(assessment: Assessment, dives: int) -> str:
+    """What the result rests on, in numbers; `dives` are the flagged ones in a row (0: not told)."""
+    a = assessment
+    parts = []
+    if dives:
+        parts.append("first flagged dive" if dives == 1 else f"{dives} flagged dives in a row")
+    if known(a.reference_u) is not None:
+        parts.append(f"reference current {'final' if a.reference_final else 'provisional'}")
+    hours = _number(a, "duration_h")
+    parts.append(f"{a.n_samples} samples" + (f" in {hours:.1f} h" if hours is not None else ""))
+    clle = known(a.clle_max)
+    if clle is not None:
+        parts.append(f"learner within {clle:.0f} m of the track")
+    excitation = known(a.excitation)
+    if excitation is not None:
+        parts.append(f"excitation {excitation:.2g} (near 0: speed and flow cannot be told apart)")
+    return "; ".join(parts)
+
+
+def checks(incident: Incident, assessment: Assessment) -> tuple[str, ...]:
+    """Three to five things a pilot can look at now, with this dive's numbers."""
+    if incident.kind is Kind.FALSE_ALARM:
+        return _check_reference(incident)
+    value = known(assessment.speed)
+    fast = value is not None and value > assessment.speed_max
+    return _check_fast(assessment) if fast else _check_slow(incident, assessment)
+
+
+def _here(*parts: str) -> str:
+    told = [part for part in parts if part]
+    return f" (this dive: {', '.join(told)})" if told else ""
+
+
+def _told(a: Assessment, name: str, words: str, form: Callable[[float], str]) -> str:
+    value = _number(a, name)
+    return "" if value is None else words.format(form(value))
+
+
+def _check_slow(incident: Incident, a: Assessment) -> tuple[str, ...]:
+    roll = _here(_told(a, "roll_mean", "mean {}", angle))
+    rates = _here(
+        _told(a, "depth_rate_climb", "climbs at {}", lambda x: speed(abs(x))),
+        _told(a, "depth_rate_dive", "dives at {}", speed),
+    )
+    pitch = _here(_told(a, "pitch_dive", "{} diving", angle), _told(a, "pitch_climb", "{} climbing", angle))
+    depth = _here(_told(a, "depth_max", "{} m", lambda x: f"{x:.0f}"))
+    return (
+        f"Roll: a step above {ROLL:.0f} degrees since the dives before is a lost wing or a load{roll}",
+        f"Climb time at full ballast or oil volume: slow means drag or weight (remora, net, growth){rates}",
+        f"Pitch in dive against climb, and the battery position it takes{pitch}",
+        f"Depth reached against depth commanded, and altitude: bottom contact or entanglement{depth}",
+        f"Vacuum, leak detection and power use since {utc(incident.since)}",
+    )
+
+
+def _check_fast(a: Assessment) -> tuple[str, ...]:
+    pitch = _here(_told(a, "pitch_dive", "{} diving", angle), _told(a, "pitch_climb", "{} climbing", angle))
+    return (
+        "Thruster: was it on? The normal range may be one for gliding only",
+        f"Does the range of {a.speed_min:.2f} to {a.speed_max:.2f} m/s fit this mission's pitch and ballast?",
+        f"Pitch and ballast commands changed since the dives before{pitch}",
+        "Current of this dive against the dives before: a wrong current passes for speed",
+    )
+
+
+def _check_reference(incident: Incident) -> tuple[str, ...]:
+    return (
+        "Current of this dive against the dives before and after: a jump is a wrong current",
+        f"Log since {utc(incident.since)}: a mission restart, abort or lost fix makes the current wrong",
+        "Fixes before and after the dive: a repeated or jumping position",
+        "Compass: heading against the course steered, and magnetic declination",
+        "Take the speed for unknown until flow and reference agree; if they do not, check roll and climb",
+    )

@@ -1,0 +1,281 @@
+"""The dispatcher: one thread takes what is due out of the outbox, one worker a channel delivers it.
+
+At least once: a row is marked delivered after its channel said so, and never given up. A channel
+that is slow or down delays no other. Messages of one incident go to one channel in their order:
+the store holds back a row while an older one of the same incident and channel is undelivered.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from queue import SimpleQueue
+from typing import Protocol
+from zlib import crc32
+
+import structlog
+
+from gliderwatch.alerts.channels import DeliveryError
+from gliderwatch.model import Alert
+
+log = structlog.get_logger(__name__)
+
+FIRST_DELAY = 5.0
+LONGEST_DELAY = 900.0
+HEARTBEAT = 5.0
+"""Seconds between two passes when nothing wakes the dispatcher."""
+SEND_LIMIT = 90.0
+"""Seconds after which a send that has not come back counts as failed."""
+
+
+@dataclass(frozen=True, slots=True)
+class OutboxRow:
+    """One alert for one channel; ``attempts`` counts the failed ones so far."""
+
+    id: int
+    alert: Alert
+    channel: str
+    attempts: int
+
+
+class OutboxStore(Protocol):
+    """What the dispatcher needs of the store. Used in the dispatcher's thread alone."""
+
+    def due(self, now: float) -> list[OutboxRow]:
+        """Undelivered rows whose next try is not after `now`, oldest first.
+
+        Not among them: rows with an older undelivered row of the same channel and the same
+        (not empty) incident, due or not.
+        """
+        ...
+
+    def delivered(self, row_id: int, now: float) -> None:
+        """Mark a row as delivered and commit; may be told twice."""
+        ...
+
+    def failed(self, row_id: int, error: str, next_try: float) -> None:
+        """Count a failed attempt, keep its reason and when to try next, and commit.
+
+        Without effect on a row that is delivered.
+        """
+        ...
+
+    def close(self) -> None:
+        """Give the connection back."""
+        ...
+
+
+class Sender(Protocol):
+    """What the dispatcher needs of a channel (`channels.Channel`)."""
+
+    def prepare(self) -> None:
+        """Load what the first message would otherwise wait for."""
+        ...
+
+    def send(self, alert: Alert) -> None:
+        """Deliver, or raise DeliveryError."""
+        ...
+
+
+def retry_delay(attempts: int, row_id: int) -> float:
+    """Seconds until the next try after `attempts` (>= 1) failed ones.
+
+    Doubles from 5 s up to 15 min, plus up to a tenth that depends on row and attempt only, so that
+    rows that failed together do not all come back together.
+
+    >>> [round(retry_delay(n, 1)) for n in (1, 2, 3, 20)]
+    [5, 10, 21, 949]
+    """
+    delay = min(FIRST_DELAY * 2.0 ** min(attempts - 1, 30), LONGEST_DELAY)
+    return delay * (1 + 0.1 * crc32(f"{row_id}:{attempts}".encode()) / 2**32)
+
+
+@dataclass(frozen=True, slots=True)
+class _Result:
+    """What became of a row: no ``error`` means delivered."""
+
+    row: OutboxRow
+    error: str | None
+    seconds: float
+    worker: _Worker
+
+
+class _Worker:
+    """The thread of one channel: sends one row at a time and reports to the dispatcher."""
+
+    def __init__(self, name: str, channel: Sender, report: Callable[[_Result], None]) -> None:
+        self.name, self.channel, self._report = name, channel, report
+        self.row: OutboxRow | None = None
+        self.since = 0.0
+        self._inbox: SimpleQueue[OutboxRow | None] = SimpleQueue()
+        self._thread = threading.Thread(target=self._run, name=f"channel-{name}", daemon=True)
+        self._thread.start()
+
+    def give(self, row: OutboxRow) -> None:
+        """Let it send a row; only while ``row`` is None."""
+        self.row, self.since = row, time.monotonic()
+        self._inbox.put(row)
+
+    def end(self) -> None:
+        """Let the thread end after what it does now."""
+        self._inbox.put(None)
+
+    def alive(self) -> bool:
+        """Whether the thread runs."""
+        return self._thread.is_alive()
+
+    def _run(self) -> None:
+        with suppress(Exception):  # the first send tells what is wrong with the channel
+            self.channel.prepare()
+        while (row := self._inbox.get()) is not None:
+            begun, error = time.monotonic(), None
+            try:
+                self.channel.send(row.alert)
+            except DeliveryError as failure:
+                error = str(failure)
+            except Exception as failure:  # a text of unknown making could hold a secret
+                error = f"unexpected {type(failure).__name__}"
+            self._report(_Result(row, error, time.monotonic() - begun, self))
+
+
+class Dispatcher:
+    """Delivers the outbox until stopped.
+
+    `open_store` is called in the dispatcher's own thread. Set `wake` after each commit that may have
+    filled the outbox: the dispatcher then looks at once. `clock` gives the time rows are due by.
+    """
+
+    def __init__(
+        self,
+        open_store: Callable[[], OutboxStore],
+        channels: Mapping[str, Sender],
+        clock: Callable[[], float],
+        wake: threading.Event,
+        delay: Callable[[int, int], float] = retry_delay,
+        limit: float = SEND_LIMIT,
+    ) -> None:
+        self._open, self._channels, self._clock, self._wake = open_store, dict(channels), clock, wake
+        self._delay, self._limit = delay, limit
+        self._results: deque[_Result] = deque()
+        self._workers: dict[str, _Worker] = {}
+        self._waiting: dict[int, float] = {}
+        self._give_up_at: float | None = None
+        self._beat = time.monotonic()
+        self._thread = threading.Thread(target=self._run, name="dispatcher", daemon=True)
+
+    def start(self) -> None:
+        """Start the threads."""
+        self._thread.start()
+
+    def stop(self, timeout: float = 2.0) -> None:
+        """End within `timeout` seconds; sends on their way get most of it to be marked.
+
+        A send that hangs is left behind in its daemon thread: its row stays undelivered.
+        """
+        self._give_up_at = time.monotonic() + 0.8 * timeout
+        self._wake.set()
+        if self._thread.ident is not None:
+            self._thread.join(timeout)
+
+    def alive(self) -> bool:
+        """Whether all threads run; the workers exist from the first pass on."""
+        return self._thread.is_alive() and all(w.alive() for w in list(self._workers.values()))
+
+    def progress(self) -> float:
+        """When the dispatcher last came round (s, `time.monotonic`); at most some seconds ago when well."""
+        return self._beat
+
+    def _run(self) -> None:
+        store: OutboxStore | None = None
+        for name, channel in self._channels.items():
+            self._workers[name] = _Worker(name, channel, self._report)
+        while not self._finished():
+            self._wake.clear()
+            try:
+                store = store or self._open()
+                pause = self._pass(store)
+            except Exception as error:  # a locked or full disk passes: this thread must not end by it
+                log.error("outbox cannot be read or written", error=f"{type(error).__name__}: {error}")
+                _close(store)
+                store, pause = None, 1.0
+            self._beat = time.monotonic()
+            self._wake.wait(pause)
+        _close(store)
+        for worker in self._workers.values():
+            worker.end()
+
+    def _finished(self) -> bool:
+        end = self._give_up_at
+        if end is None:
+            return False
+        busy = any(w.row is not None for w in self._workers.values())  # until its result is noted
+        return not busy or time.monotonic() >= end
+
+    def _report(self, result: _Result) -> None:
+        self._results.append(result)
+        self._wake.set()
+
+    def _pass(self, store: OutboxStore) -> float:
+        """One round: note what came back, hand out what is due. Returns how long to wait (s)."""
+        while self._results:
+            self._note(store, self._results[0])
+            self._results.popleft()  # only now: when the store fails, the result is noted next time
+        self._replace_stuck(store)
+        if self._give_up_at is not None:
+            return max(0.0, min(0.1, self._give_up_at - time.monotonic()))
+        now = self._clock()
+        for row in sorted(store.due(now), key=lambda r: (-r.alert.severity, r.id)):
+            worker = self._workers.get(row.channel)
+            if worker is None:
+                self._failed(store, row, "the configuration has no such channel any more")
+            elif worker.row is None:
+                self._waiting.pop(row.id, None)
+                worker.give(row)
+        # a row that is due but waits for its worker needs no alarm clock: the worker's report wakes us
+        return min([HEARTBEAT, self._limit, *(t - now for t in self._waiting.values() if t > now)])
+
+    def _note(self, store: OutboxStore, result: _Result) -> None:
+        row, worker = result.row, result.worker
+        if result.error is None:
+            store.delivered(row.id, self._clock())
+            self._waiting.pop(row.id, None)
+            seconds = round(result.seconds, 3)
+            log.info("alert delivered", alert=row.alert.id, channel=row.channel, seconds=seconds)
+        elif worker.row is not None:  # else its row was given up before, and counted
+            self._failed(store, row, result.error)
+        worker.row = None
+
+    def _replace_stuck(self, store: OutboxStore) -> None:
+        """Leave a send that does not come back behind, so that the channel's next message has a thread.
+
+        Every network call has its own time limit: this is for what has none, such as name look-up.
+        """
+        for name, worker in list(self._workers.items()):
+            if worker.row is not None and time.monotonic() - worker.since > self._limit:
+                self._failed(store, worker.row, f"no answer within {self._limit:g} s")
+                worker.row = None
+                worker.end()
+                self._workers[name] = _Worker(name, worker.channel, self._report)
+
+    def _failed(self, store: OutboxStore, row: OutboxRow, error: str) -> None:
+        delay = self._delay(row.attempts + 1, row.id)
+        store.failed(row.id, error, self._clock() + delay)
+        self._waiting[row.id] = self._clock() + delay
+        log.warning(
+            "alert not delivered",
+            alert=row.alert.id,
+            channel=row.channel,
+            error=error,
+            attempts=row.attempts + 1,
+            retry_in=round(delay, 1),
+        )
+
+
+def _close(store: OutboxStore | None) -> None:
+    if store is not None:
+        with suppress(Exception):  # it may be what failed
+            store.close()

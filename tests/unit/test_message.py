@@ -1,0 +1,359 @@
+"""What an alert tells a pilot, and that nothing from a file can break out of it."""
+
+import re
+import unicodedata
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from alert_support import DISAGREE, DIVE, HEALTHY, SLOW, SURFACE, incident
+from gliderwatch.alerts import message
+from gliderwatch.alerts.words import angle, clean, duration, flow, map_link, place, speed
+from gliderwatch.model import Alert, Assessment, Kind, Severity
+
+WHO = {"alert_id": "a1", "audience": Severity.CRITICAL}
+
+
+class Reader(HTMLParser):
+    """What a mail client would show of an HTML message, and its tags and links."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.tags: set[str] = set()
+        self.links: list[str] = []
+        self.words: list[str] = []
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+        self.links += [value or "" for name, value in attrs if name == "href"]
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data)
+
+    @property
+    def shown(self) -> str:
+        return " ".join("".join(self.words).split())
+
+
+def opened(assessment: Assessment = SLOW, kind: Kind = Kind.ANOMALY) -> Alert:
+    return message.opened(incident(assessment, kind=kind), assessment, **WHO)
+
+
+def section(body: str, heading: str) -> list[str]:
+    block = next(b for b in body.split("\n\n") if b.startswith(heading + "\n"))
+    return [line.removeprefix("- ") for line in block.strip().split("\n")[1:]]
+
+
+MAP = "https://www.openstreetmap.org/?mlat=24.20575&mlon=-83.02057#map=9/24.20575/-83.02057"
+FACTS = [
+    "electa",
+    "2022-11-05 09:12 UTC (2 dives)",
+    "2022-11-05 12:34 UTC",
+    "24° 12.345' N, 083° 01.234' W (24.20575, -83.02057)",
+    "0.11 m/s, normal 0.22 to 0.30 m/s",
+    "Flow learnt: 0.23 m/s towards 041° true",
+    "Reference flow: 0.21 m/s towards 039° true (final)",
+    "p_E 0.031 (limit 0.300)",
+    "Speaks for",
+    "Speaks against",
+    "Check",
+]
+
+
+class TestOpened:
+    def test_title_says_it_all(self) -> None:
+        assert opened().title == "ANOMALY electa: 0.11 m/s through water (normal 0.22 to 0.30)"
+
+    def test_first_line_says_what_and_how_bad(self) -> None:
+        first = opened().body.split("\n")[0]
+        assert (
+            first
+            == "electa flies at 0.11 m/s through the water: 50 % of its lowest normal speed of 0.22 m/s."
+        )
+
+    @pytest.mark.parametrize("fact", FACTS)
+    def test_text_and_html_hold_each_fact(self, fact: str) -> None:
+        made = opened()
+        assert fact in made.body
+        assert fact in Reader(made.html).shown
+
+    def test_map_is_linked_in_both(self) -> None:
+        made = opened()
+        assert f"Map: {MAP}\n" in made.body
+        assert Reader(made.html).links == [MAP]
+
+    def test_html_has_no_tables_and_the_title(self) -> None:
+        reader = Reader(opened().html)
+        assert not reader.tags & {"table", "script", "img"}
+        assert opened().title in reader.shown
+
+    def test_fields_for_delivery(self) -> None:
+        made = opened()
+        assert (made.id, made.audience, made.kind) == ("a1", Severity.CRITICAL, Kind.ANOMALY)
+        assert (made.incident, made.time) == ("electa/anomaly/1667639520", SURFACE)
+
+    def test_evidence_is_weighed(self) -> None:
+        body = opened().body
+        pro, con = " ".join(section(body, "Speaks for")), " ".join(section(body, "Speaks against"))
+        assert "learnt flow and reference agree: 0.02 m/s apart" in pro
+        assert "0.12 m/s along the heading, out of the normal range" in pro
+        assert "the dive before was normal: 0.26 m/s, then 0.11 m/s" in pro
+        assert "mean roll 18 degrees" in pro
+        assert "dive (-26 degrees) and climb (17 degrees)" in pro
+        assert "dives at 0.17 m/s but climbs at 0.08 m/s" in pro
+        assert "the glider itself reports 0.24 m/s, within the normal range" in con
+        assert "magnetic declination from WMM2025" in con
+
+    def test_absent_evidence_is_left_out(self) -> None:
+        bare = replace(
+            SLOW,
+            evidence={},
+            notes=(),
+            p_e=None,
+            flow_u=None,
+            clle_max=None,
+            excitation=None,
+            lat=None,
+            lon=None,
+        )
+        body = opened(bare).body
+        assert section(body, "Speaks for") == ["nothing found in this dive"]
+        assert "Map:" not in body
+        assert "Where: unknown" in body
+        assert "Flow learnt: unknown" in body
+        assert "None" not in body
+        assert "nan" not in body
+        assert "this dive:" not in body
+
+    def test_not_a_number_is_missing(self) -> None:
+        nan = float("nan")
+        odd = replace(
+            SLOW, lat=nan, speed=nan, flow_u=nan, p_e=nan, evidence=dict.fromkeys(SLOW.evidence, nan)
+        )
+        made = opened(odd)
+        assert "nan" not in made.title + made.body
+        assert "speed unknown (normal 0.22 to 0.30)" in made.title
+
+    def test_doubts_about_the_data_speak_against(self) -> None:
+        evidence = {
+            "heading_steadiness": 0.995,
+            "duration_h": 0.6,
+            "unobserved_h": 1.2,
+            "drift_h": 0.8,
+            "fix_gap_minutes": 42.0,
+        }
+        con = " ".join(
+            section(opened(replace(SLOW, evidence=evidence, reference_final=False)).body, "Speaks against")
+        )
+        for words in ("heading hardly changed", "0.6 h", "1.2 h", "0.8 h", "42 min", "provisional"):
+            assert words in con
+
+    def test_how_sure_is_told_in_numbers(self) -> None:
+        line = next(x for x in opened().body.split("\n") if x.startswith("How sure: "))
+        assert "2 flagged dives in a row" in line
+        assert "reference current final" in line
+        assert "812 samples in 3.4 h" in line
+        assert "within 84 m" in line
+        assert "excitation 0.41" in line
+
+    def test_checks_for_a_slow_glider(self) -> None:
+        checks = section(opened().body, "Check")
+        assert 3 <= len(checks) <= 5
+        for word, line in zip(("Roll", "Climb", "Pitch", "Depth", "Vacuum"), checks, strict=True):
+            assert line.startswith(word)
+        assert "18 degrees" in checks[0]
+        assert "182 m" in checks[3]
+
+    def test_checks_for_a_fast_glider(self) -> None:
+        made = opened(replace(SLOW, speed=0.45))
+        assert "150 % of its highest normal speed of 0.30 m/s" in made.body
+        assert section(made.body, "Check")[0].startswith("Thruster")
+
+    def test_speed_that_rounds_into_the_range_shows_why_it_is_flagged(self) -> None:
+        assert "0.217 m/s through water (normal 0.22" in opened(replace(SLOW, speed=0.217)).title
+        assert "99 % of its lowest" in opened(replace(SLOW, speed=0.2199)).body
+
+
+class TestFalseAlarm:
+    def test_says_that_the_reference_is_in_doubt(self) -> None:
+        made = opened(DISAGREE, Kind.FALSE_ALARM)
+        assert made.title.startswith("FALSE ALARM electa: flow and reference disagree, 0.11 m/s")
+        first = made.body.split("\n")[0]
+        assert "disagree by 0.58 m/s (p_E 0.412, limit 0.300)" in first
+        assert "cannot be trusted" in first
+
+    def test_the_same_evidence_changes_sides(self) -> None:
+        body = opened(DISAGREE, Kind.FALSE_ALARM).body
+        pro = " ".join(section(body, "Speaks for"))
+        assert "across the heading the track misses by 0.31 m/s" in pro
+        assert "the glider itself reports 0.24 m/s, within the normal range" in pro
+        # a speed that needs the current is no evidence where the current is in doubt
+        assert "along the heading" not in body
+
+    def test_checks_are_about_current_log_fix_and_compass(self) -> None:
+        checks = section(opened(DISAGREE, Kind.FALSE_ALARM).body, "Check")
+        assert 3 <= len(checks) <= 5
+        assert [line.split(" ")[0].rstrip(":") for line in checks[:4]] == [
+            "Current",
+            "Log",
+            "Fixes",
+            "Compass",
+        ]
+
+
+class TestThread:
+    def test_reminder(self) -> None:
+        made = message.reminder(incident(), SLOW, 26.0, **WHO)
+        assert made.kind is Kind.REMINDER
+        assert made.severity is Severity.CRITICAL
+        assert made.title.startswith("REMINDER electa: anomaly for 26.0 h, 0.11 m/s")
+        assert "still open after 26.0 h" in made.body
+        assert "Worst: 0.11 m/s" in made.body
+
+    def test_reminder_after_a_dive_without_result(self) -> None:
+        made = message.reminder(
+            incident(), replace(HEALTHY, flag=None, reason="no fix", speed=None), 26.0, **WHO
+        )
+        assert "Latest dive: not assessed (no fix)." in made.body
+        assert "flies at" not in made.body
+
+    def test_all_clear(self) -> None:
+        made = message.all_clear(incident(cleared_at=SURFACE + 3600), HEALTHY, **WHO)
+        assert (made.kind, made.severity, made.audience) == (Kind.ALL_CLEAR, Severity.INFO, Severity.CRITICAL)
+        assert made.title == "ALL CLEAR electa: 0.25 m/s through water (normal 0.22 to 0.30)"
+        assert "Lasted: 4.4 h, cleared 2022-11-05 13:34 UTC" in made.body
+        assert "Since: 2022-11-05 09:12 UTC" in made.body
+
+    def test_correction_withdraws(self) -> None:
+        made = message.correction(incident(), None, HEALTHY, "the final current of the dive arrived", **WHO)
+        assert (made.kind, made.severity) == (Kind.CORRECTION, Severity.INFO)
+        assert (
+            made.title == "CORRECTION electa: anomaly withdrawn, 0.25 m/s through water (normal 0.22 to 0.30)"
+        )
+        assert "the final current of the dive arrived. The anomaly is withdrawn." in made.body
+        assert "worst 0.11 m/s, open" in made.body
+        assert "Known now: no incident" in made.body
+
+    def test_correction_changes_numbers(self) -> None:
+        now = replace(SLOW, speed=0.151)
+        made = message.correction(incident(), incident(now), now, "a missing segment arrived", **WHO)
+        assert made.severity is Severity.CRITICAL
+        assert "Told before: anomaly since 2022-11-05 09:12 UTC, 2 dives, worst 0.11 m/s, open" in made.body
+        assert "Known now: anomaly since 2022-11-05 09:12 UTC, 2 dives, worst 0.15 m/s, open" in made.body
+
+    def test_all_of_one_incident_share_its_thread(self) -> None:
+        made = [
+            message.opened(incident(), SLOW, **WHO),
+            message.reminder(incident(), SLOW, 24, **WHO),
+            message.all_clear(incident(), HEALTHY, **WHO),
+            message.correction(incident(), None, HEALTHY, "", **WHO),
+        ]
+        assert {a.incident for a in made} == {incident().id}
+
+
+class TestNotices:
+    def test_surfacing(self) -> None:
+        made = message.surfacing(HEALTHY, DIVE - 1800, alert_id="s")
+        assert made.title == "SURFACED electa 2022-11-05 12:34 UTC: 0.25 m/s, normal"
+        assert (made.kind, made.severity, made.incident) == (Kind.SURFACING, Severity.INFO, "")
+        assert "After the one before: 3.9 h" in made.body
+        assert "24° 12.345' N" in made.body
+        assert "Flow learnt: 0.23 m/s" in made.body
+
+    def test_first_surfacing_has_no_one_before(self) -> None:
+        assert "After the one before" not in message.surfacing(HEALTHY, None, alert_id="s").body
+
+    def test_operator(self) -> None:
+        made = message.operator(
+            "no new files", "None for 6 h.\n\nCheck it.", SURFACE, severity=Severity.WARNING, **WHO
+        )
+        assert made.title == "GLIDERWATCH: no new files"
+        assert made.body.startswith("None for 6 h.\nCheck it.\n")
+        assert made.kind is Kind.OPERATOR
+
+
+nasty = st.text(max_size=300) | st.sampled_from(
+    [
+        "<script>alert(1)</script>",
+        "a\r\nBcc: x@y.z",
+        "\x1b[31m",
+        "&lt;b&gt;",
+        "{{ 7*7 }}",
+        "\u202eatcele",
+        "\ud800",
+    ]
+)
+
+
+class TestNothingBreaksOut:
+    @given(glider=nasty, segment=nasty, note=nasty, why=nasty)
+    def test_in_any_message(self, glider: str, segment: str, note: str, why: str) -> None:
+        dive = replace(SLOW, glider=glider, segment=segment, notes=(note,), reason=why)
+        case = incident(dive)
+        for made in (
+            message.opened(case, dive, **WHO),
+            message.reminder(case, replace(dive, flag=None), 24, **WHO),
+            message.all_clear(case, dive, **WHO),
+            message.correction(case, None, dive, why, **WHO),
+            message.surfacing(dive, None, alert_id="s"),
+            message.operator(note, why, SURFACE, severity=Severity.INFO, glider=glider, **WHO),
+        ):
+            self.check(made)
+
+    def check(self, made: Alert) -> None:
+        assert len(made.title) <= 200
+        for text in (made.title, made.body.replace("\n", ""), made.html.replace("\n", "")):
+            assert not any(unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp") for c in text)
+            text.encode("utf-8")
+        reader = Reader(made.html)
+        allowed = {"html", "head", "meta", "body", "p", "b", "br", "ul", "li", "a"}
+        assert reader.tags <= allowed
+        assert all(link.startswith("https://www.openstreetmap.org/?mlat=") for link in reader.links)
+        assert made.title in reader.shown
+
+    @given(nasty)
+    def test_a_name_is_one_line_and_stays_itself(self, text: str) -> None:
+        line = clean(text)
+        assert len(line) <= 200
+        assert clean(line) == line
+        if re.fullmatch(r"[a-z0-9_-]{1,60}", text):
+            assert line == text
+
+
+class TestWords:
+    @pytest.mark.parametrize(
+        ("lat", "lon", "words"),
+        [
+            (0.0, 0.0, "00° 00.000' N, 000° 00.000' E"),
+            (-0.5, 179.9999999, "00° 30.000' S, 180° 00.000' E"),
+            (9.99999999, -9.5, "10° 00.000' N, 009° 30.000' W"),
+        ],
+    )
+    def test_place(self, lat: float, lon: float, words: str) -> None:
+        assert place(lat, lon).startswith(words)
+
+    @given(st.floats(-90, 90), st.floats(-180, 180))
+    def test_place_reads_back(self, lat: float, lon: float) -> None:
+        found = re.match(r"(\d\d)° (\d\d\.\d{3})' ([NS]), (\d{3})° (\d\d\.\d{3})' ([EW]) ", place(lat, lon))
+        assert found is not None
+        read = (float(found[1]) + float(found[2]) / 60) * (1 if found[3] == "N" else -1)
+        assert float(found[2]) < 60
+        assert read == pytest.approx(lat, abs=1e-5)
+
+    @pytest.mark.parametrize(
+        ("u", "v", "words"),
+        [(0.1, 0.0, "090"), (0.0, -0.1, "180"), (-0.1, 0.0, "270"), (-0.0001, 0.1, "000"), (0.1, 0.1, "045")],
+    )
+    def test_flow_is_named_by_where_it_goes(self, u: float, v: float, words: str) -> None:
+        assert flow(u, v).endswith(f"towards {words}° true")
+
+    def test_small_things(self) -> None:
+        assert speed(-0.004) == "0.00 m/s"
+        assert duration(59.0 * 60) == "59 min"
+        assert duration(3 * 86400) == "3.0 days"
+        assert angle(-0.5) == "-29 degrees"
+        assert map_link(None, 1.0) == ""
