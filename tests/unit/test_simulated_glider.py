@@ -1,0 +1,363 @@
+"""The simulated glider against what is known of real ones, from what it sends and from its truth."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from gliderwatch.simulate.flight import Airframe, steady_glide
+from gliderwatch.simulate.glider import simulate
+from gliderwatch.simulate.ocean import Ellipse, Sea, make_ocean
+from gliderwatch.simulate.onboard import Point, displacement, nmea, offset, own_speed
+from gliderwatch.simulate.scenario import Fault, FaultKind, FixIn, Mission, Scenario
+from gliderwatch.simulate.telemetry import CADENCE
+
+DAY = 86400.0
+EVERY_CYCLE = dict.fromkeys(CADENCE, 4.0)
+STRAIGHT = Scenario(days=2.0, waypoints=(Point(30.0, -84.0),), variation=0.28, cadence=EVERY_CYCLE)
+ONSET = STRAIGHT.start + DAY
+
+
+class Closure(NamedTuple):
+    """A dive as known from its files alone: mean velocities (m/s, true north) between the fixes."""
+
+    t_dive: float
+    ground: np.ndarray
+    own: np.ndarray
+    current: np.ndarray
+
+    @property
+    def misfit(self) -> float:
+        return float(np.hypot(*(self.ground - self.own - self.current)))
+
+    @property
+    def along(self) -> float:
+        return float((self.ground - self.current) @ self.own / np.hypot(*self.own))
+
+    @property
+    def across(self) -> float:
+        way = self.own / np.hypot(*self.own)
+        return float((self.ground - self.current) @ [-way[1], way[0]])
+
+
+def samples(mission: Mission, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Times and values of a sensor in all files, first lines left out as readers do."""
+    t, v = [], []
+    for segment in mission.segments:
+        names = [sensor.name for sensor in segment.sensors.columns]
+        rows = 1 + np.flatnonzero(segment.updated[1:, names.index(name)])
+        t.append(segment.values[rows, names.index("m_present_time")])
+        v.append(segment.values[rows, names.index(name)])
+    return np.concatenate(t), np.concatenate(v)
+
+
+def degrees(values: np.ndarray) -> np.ndarray:
+    whole = np.trunc(values / 100)
+    return whole + (values - 100 * whole) / 60
+
+
+def east_north(east: float, north: float, clockwise: float) -> np.ndarray:
+    c, s = np.cos(clockwise), np.sin(clockwise)
+    return np.array([east * c + north * s, north * c - east * s])
+
+
+def closures(mission: Mission, variation: float, kind: str = "final") -> list[Closure]:
+    """Ground velocity, dead-reckoned velocity and reported current of every dive.
+
+    Speed is depth rate over tan(pitch) of the whole legs, so it shares nothing with the on-board filter.
+    """
+    t_fix, lat = samples(mission, "m_gps_lat")
+    lon = degrees(samples(mission, "m_gps_lon")[1])
+    new = np.r_[True, (np.diff(lat) != 0) | (np.diff(lon) != 0)]
+    t_fix, lat, lon = t_fix[new], degrees(lat)[new], lon[new]
+    t, depth = samples(mission, "m_depth")
+    sensors = {name: samples(mission, name) for name in ("m_pitch", "m_heading")}
+    t_water, east = samples(mission, f"m_{kind}_water_vx")
+    _, north = samples(mission, f"m_{kind}_water_vy")
+    found = []
+    for dive in mission.truth[:-1]:
+        i = np.searchsorted(t_fix, dive.t_dive, "right") - 1
+        j = np.searchsorted(t_fix, dive.t_surface, "right")
+        way = displacement(Point(lat[i], lon[i]), Point(lat[j], lon[j]))
+        under = (t >= dive.t_dive) & (t <= dive.t_surface)
+        pitch, heading = (np.interp(t[under], at, np.unwrap(values)) for at, values in sensors.values())
+        steep = np.abs(pitch) > 0.3
+        rate = -np.gradient(depth[under], t[under])
+        speed = np.median(rate[steep] / np.tan(pitch[steep]))
+        unit = np.array([np.sin(heading - variation).mean(), np.cos(heading - variation).mean()])
+        between = t_fix[j] - t_fix[i]
+        k = np.searchsorted(t_water, dive.t_surface)
+        found.append(
+            Closure(
+                dive.t_dive,
+                np.array(way) / between,
+                speed * unit * (dive.t_surface - dive.t_dive) / between,
+                east_north(east[k], north[k], -variation),
+            )
+        )
+    return found
+
+
+def medians(mission: Mission, name: str) -> tuple[float, float]:
+    """Median of a property of `Closure` before and after the onset of the fault."""
+    found = closures(mission, mission.scenario.variation)
+    before = [getattr(dive, name) for dive in found if dive.t_dive < ONSET - 3.3 * 3600]
+    after = [getattr(dive, name) for dive in found if dive.t_dive > ONSET]
+    return float(np.median(before)), float(np.median(after))
+
+
+# --------------------------------------------------------------------------- closure
+
+
+@pytest.mark.parametrize("fix_in", list(FixIn))
+def test_files_close_to_the_noise(fix_in: FixIn) -> None:
+    """Fixes err by 3 m a component, two of them by 6 m: 0.6 mm/s over 3 h."""
+    scenario = replace(
+        STRAIGHT, fix_in=fix_in, cadence=EVERY_CYCLE | {"m_initial_water_vx": 4, "m_initial_water_vy": 4}
+    )
+    mission = simulate(scenario)
+    for kind in ("initial", "final"):
+        found = closures(mission, scenario.variation, kind)
+        assert len(found) >= 12
+        assert np.median([dive.misfit for dive in found]) < 1e-3
+        assert max(dive.misfit for dive in found) < 2e-3
+
+
+def test_files_do_not_close_without_variation() -> None:
+    """Own speed plus current is the ground velocity turned by 0.28 rad, 0.2 m/s of it."""
+    found = closures(simulate(STRAIGHT), 0.0)
+    assert np.median([dive.misfit for dive in found]) == pytest.approx(0.28 * 0.2, abs=0.02)
+
+
+def test_current_is_reported_in_magnetic_axes_and_true_to_the_flight_model() -> None:
+    """The reported current is the true one less what the glider overrates its own speed by."""
+    mission = simulate(STRAIGHT)
+    for dive, truth in zip(closures(mission, STRAIGHT.variation), mission.truth, strict=False):
+        excess = np.array(truth.through_water) * (truth.believed_speed / truth.speed - 1)
+        np.testing.assert_allclose(dive.current, np.array(truth.current) - excess, atol=2.5e-3)
+
+
+def test_truth_adds_up_to_the_way_over_ground() -> None:
+    mission = simulate(STRAIGHT)
+    for dive, truth in zip(closures(mission, STRAIGHT.variation), mission.truth, strict=False):
+        np.testing.assert_allclose(dive.ground, np.add(truth.through_water, truth.current), atol=6e-3)
+
+
+# --------------------------------------------------------------------------- faults
+
+
+def test_a_remora_slows_the_believed_speed_at_once() -> None:
+    mission = simulate(replace(STRAIGHT, faults=(Fault(FaultKind.REMORA, ONSET, 2.0),)))
+    before, after = medians(mission, "along")
+    assert before == pytest.approx(0.253, abs=0.01)
+    assert after / before == pytest.approx(0.75, abs=0.02)
+    first = next(dive for dive in closures(mission, STRAIGHT.variation) if dive.t_dive > ONSET)
+    assert first.along == pytest.approx(after, abs=0.01)
+    assert medians(mission, "misfit")[1] < 3e-3
+    speeds = [truth.speed for truth in mission.truth]
+    assert min(speeds) / max(speeds) == pytest.approx(0.68, abs=0.02)
+
+
+def test_a_lost_wing_hides_in_the_current() -> None:
+    mission = simulate(replace(STRAIGHT, faults=(Fault(FaultKind.WING_LOSS, ONSET, 0.4),)))
+    before, after = medians(mission, "along")
+    assert after == pytest.approx(before, abs=0.003)
+    healthy, hurt = mission.truth[2], mission.truth[-1]
+    assert hurt.speed / healthy.speed == pytest.approx(0.6, abs=0.01)
+    assert hurt.believed_speed == pytest.approx(healthy.believed_speed, rel=0.01)
+
+
+def test_a_wrong_current_shows_across_the_way_only() -> None:
+    mission = simulate(replace(STRAIGHT, faults=(Fault(FaultKind.DAC_WRONG, ONSET, 0.2),)))
+    assert medians(mission, "across") == pytest.approx((0.0, -0.2), abs=0.003)
+    before, after = medians(mission, "along")
+    assert after == pytest.approx(before, abs=0.003)
+
+
+def test_faults_are_named_from_their_onset_and_none_does_nothing() -> None:
+    faults = (Fault(FaultKind.NONE, STRAIGHT.start, 0.0), Fault(FaultKind.REMORA, ONSET, 1.0))
+    mission = simulate(replace(STRAIGHT, faults=faults))
+    named = {truth.faults for truth in mission.truth if truth.t_surface < ONSET}
+    assert named == {("none",)}
+    assert mission.truth[-1].faults == ("none", "remora")
+    healthy = simulate(STRAIGHT)
+    for segment, other in zip(mission.segments, healthy.segments, strict=True):
+        np.testing.assert_array_equal(segment.values, other.values)
+
+
+@pytest.mark.parametrize(("kind", "size"), [(FaultKind.REMORA, 0.5), (FaultKind.WING_LOSS, 1.0)])
+def test_a_fault_of_impossible_size_is_refused(kind: FaultKind, size: float) -> None:
+    with pytest.raises(ValueError, match=kind.value):
+        Fault(kind, 0.0, size)
+
+
+# --------------------------------------------------------------------------- how files are split
+
+
+def test_the_fix_is_in_the_file_that_the_style_says() -> None:
+    for fix_in, shift in ((FixIn.OWN, 0), (FixIn.NEXT, 1)):
+        mission = simulate(replace(STRAIGHT, days=1.0, fix_in=fix_in))
+        t, _ = samples(mission, "m_water_vx")
+        for i, truth in enumerate(mission.truth):
+            segment = mission.segments[i + shift]
+            first = t[np.searchsorted(t, truth.t_surface)]
+            assert segment.header.opened <= first <= segment.closed
+            assert 40 <= first - truth.t_surface <= 70
+            assert mission.segments[i].header.full_name == truth.segment
+            assert mission.segments[i].header.opened < truth.t_dive < mission.segments[i].closed
+
+
+def test_the_final_current_comes_when_communication_is_over() -> None:
+    for fix_in in FixIn:
+        mission = simulate(replace(STRAIGHT, fix_in=fix_in))
+        t, _ = samples(mission, "m_final_water_vx")
+        waits = [t[i] - truth.t_surface for truth, i in zip(mission.truth, range(len(t)), strict=False)]
+        assert len(t) == len(mission.truth)
+        assert 300 < min(waits) < max(waits) < 2700
+        assert np.ptp(waits) > 900
+
+
+def test_an_opened_file_repeats_the_old_fix() -> None:
+    mission = simulate(replace(STRAIGHT, days=1.0, fix_in=FixIn.NEXT))
+    for before, segment in zip(mission.segments[1:], mission.segments[2:], strict=False):
+        names = [sensor.name for sensor in segment.sensors.columns]
+        lat = names.index("m_gps_lat")
+        old = before.values[before.updated[:, lat], lat][-1]
+        assert segment.values[0, lat] == segment.values[1, lat] == old
+
+
+def test_sensors_keep_their_cadence() -> None:
+    scenario = Scenario(
+        days=1.0, cadence={"m_depth": 4.0, "m_heading": 720.0, "m_lat": 1800.0, "m_gps_lat": 4.0}
+    )
+    mission = simulate(scenario)
+    for name, least in (("m_heading", 720.0), ("m_lat", 1800.0)):
+        t, _ = samples(mission, name)
+        truth = mission.truth[2]
+        steps = np.diff(t[(t > truth.t_dive + 1) & (t < truth.t_surface)])
+        assert set(steps) == {least}
+    t, _ = samples(mission, "m_depth")
+    assert np.diff(t).min() == 4.0
+
+
+def test_a_sensor_that_is_not_simulated_is_refused() -> None:
+    with pytest.raises(ValueError, match="m_altimeter_voltage is not simulated"):
+        simulate(Scenario(cadence={"m_altimeter_voltage": 4.0}))
+    with pytest.raises(ValueError, match=r"every 1\.0 s"):
+        simulate(Scenario(cadence={"m_depth": 1.0}))
+
+
+# --------------------------------------------------------------------------- behaviour
+
+
+def test_dives_stay_between_the_surface_and_the_depth_limit() -> None:
+    mission = simulate(replace(STRAIGHT, depths=(4.0, 60.0), bottom_sigma=0.0))
+    t, depth = samples(mission, "m_depth")
+    for truth in mission.truth:
+        under = depth[(t > truth.t_dive + 120) & (t < truth.t_surface - 120)]
+        assert under.min() > 2.0
+        assert 58.0 < under.max() < 60.3
+        assert truth.t_surface - truth.t_dive == pytest.approx(3 * 3600, abs=1000)
+    at_surface = depth[(t > mission.truth[0].t_surface) & (t < mission.truth[1].t_dive)]
+    assert at_surface.max() < 0.3
+
+
+def test_it_goes_through_its_waypoints_against_a_current() -> None:
+    waypoints = (Point(27.56, -84.0), Point(27.56, -83.93))
+    sea = Sea(residual=(0.12, 0.0), sigma=0.0, tides=())
+    mission = simulate(replace(STRAIGHT, waypoints=waypoints, sea=sea, days=1.5))
+    lat, lon = (degrees(samples(mission, name)[1]) for name in ("m_gps_lat", "m_gps_lon"))
+    for place in waypoints:
+        ways = np.hypot(
+            (lat - place.lat) * 60 * 1852, (lon - place.lon) * 60 * 1852 * np.cos(np.radians(27.5))
+        )
+        assert ways.min() < 3500
+    steered = degrees(samples(mission, "c_wpt_lon")[1])
+    assert {round(lon, 2) for lon in steered} == {-84.0, -83.93}
+
+
+def test_same_seed_same_values_other_seed_other_values() -> None:
+    scenario = Scenario(days=1.0)
+    one, two, other = simulate(scenario), simulate(scenario), simulate(replace(scenario, seed=2))
+    for a, b, c in zip(one.segments, two.segments, other.segments, strict=False):
+        np.testing.assert_array_equal(a.values, b.values)
+        np.testing.assert_array_equal(a.updated, b.updated)
+        assert (a.closed, a.sent) == (b.closed, b.sent)
+        assert a.values.shape != c.values.shape or not np.array_equal(a.values, c.values, equal_nan=True)
+    assert one.truth == two.truth
+
+
+# --------------------------------------------------------------------------- parts
+
+
+def test_flight_is_a_balance_of_forces() -> None:
+    """Lift, drag and buoyancy (N) along east and up, for a glider of 1025 kg/m3 water."""
+    frame, drive, pitch, drag = Airframe(), 150e-6, 0.42, 1.7
+    glide = steady_glide(pitch, drive, frame, drag=drag)
+    speed, path = np.hypot(glide.horizontal, glide.vertical), np.arctan2(glide.vertical, glide.horizontal)
+    assert path == pytest.approx(pitch + glide.attack)
+    pressure = 0.5 * 1025 * frame.area * speed**2
+    lift = pressure * frame.lift_slope * glide.attack
+    resistance = pressure * (drag * frame.parasite_drag + frame.induced_drag * glide.attack**2)
+    assert lift * np.sin(path) == pytest.approx(resistance * np.cos(path))
+    assert lift * np.cos(path) + resistance * np.sin(path) == pytest.approx(1025 * 9.81 * drive)
+
+
+def test_a_glider_cannot_fly_too_flat_or_without_drive() -> None:
+    with pytest.raises(ValueError, match="glide steeper"):
+        steady_glide(0.02, 150e-6, Airframe(), drag=3.0)
+    with pytest.raises(ValueError, match="positive"):
+        steady_glide(0.4, 0.0, Airframe())
+
+
+def test_believed_speed_is_held_over_inflections() -> None:
+    turn = np.clip(np.linspace(-8, 8, 400), -1, 1)
+    depth = np.cumsum(-0.12 * turn * 4.0)
+    speed = own_speed(depth - depth.min(), 0.45 * turn, 4.0)
+    np.testing.assert_allclose(speed[5:-5], 0.12 / np.tan(0.45), rtol=0.15)
+
+
+def test_offset_and_displacement_agree_with_a_known_geodesic() -> None:
+    """One minute of latitude on WGS 84 at 45 degrees is 1852.2 m, one of longitude 1314.2 m."""
+    start = Point(45.0, -62.0)
+    assert displacement(start, Point(45 + 1 / 60, -62.0)).north == pytest.approx(1852.2, abs=0.3)
+    assert displacement(start, Point(45.0, -62 + 1 / 60)).east == pytest.approx(1314.2, abs=0.3)
+    lat, lon = offset(start, np.array(7000.0), np.array(-9000.0))
+    assert displacement(start, Point(float(lat), float(lon))) == pytest.approx((7000.0, -9000.0), abs=1e-6)
+
+
+def test_nmea_positions() -> None:
+    np.testing.assert_allclose(nmea(np.array([38.727, -62.3259, 0.5])), [3843.62, -6219.554, 30.0])
+
+
+def test_an_ellipse_has_its_axes_and_turns_its_way() -> None:
+    tide = Ellipse(period=3600.0, major=0.2, minor=0.1, inclination=np.pi / 2, phase=0.0)
+    u, v = tide.current(np.array([0.0, 900.0, 1800.0]))
+    np.testing.assert_allclose(u, [0.0, -0.1, 0.0], atol=1e-12)
+    np.testing.assert_allclose(v, [0.2, 0.0, -0.2], atol=1e-12)
+
+
+def test_the_slow_current_has_its_strength_memory_and_size() -> None:
+    sea = Sea(residual=(0.1, -0.05), sigma=0.08, tau=10 * 3600.0, scale=20e3, tides=())
+    days = 200
+    t = np.arange(0.0, days * DAY, 3600.0)
+    zero = np.zeros_like(t)
+    here, later, there = [], [], []
+    for seed in range(12):
+        ocean = make_ocean(sea, 0.0, days * DAY, np.random.default_rng(seed))
+        u, v = ocean.current(t, zero, zero)
+        far, _ = ocean.current(t, zero + 20e3, zero)
+        assert (u.mean(), v.mean()) == pytest.approx((0.1, -0.05), abs=0.03)
+        here.append(np.var(u - 0.1))
+        later.append(np.mean((u[10:] - 0.1) * (u[:-10] - 0.1)))
+        there.append(np.mean((u - 0.1) * (far - 0.1)))
+    assert np.sqrt(np.mean(here)) == pytest.approx(0.08, rel=0.05)
+    assert np.mean(later) / np.mean(here) == pytest.approx(np.exp(-1), abs=0.05)
+    assert np.mean(there) / np.mean(here) == pytest.approx(np.exp(-0.5), abs=0.12)
+
+
+def test_the_ocean_does_not_go_on_beyond_its_span() -> None:
+    ocean = make_ocean(Sea(), 0.0, DAY, np.random.default_rng(0))
+    with pytest.raises(ValueError, match="longer mission"):
+        ocean.current(np.array([2 * DAY]), np.zeros(1), np.zeros(1))
