@@ -1,5 +1,7 @@
 """One root of errors, branched by what the caller does about them."""
 
+from __future__ import annotations
+
 
 class GliderwatchError(Exception):
     """Everything gliderwatch raises on purpose; its text is fit for a user."""
@@ -18,6 +20,10 @@ class MissingCache(Retry):
     def __init__(self, crc: str) -> None:
         super().__init__(f"cache file {crc}.cac is missing")
         self.crc = crc
+
+    def __reduce__(self) -> tuple[type[MissingCache], tuple[str]]:
+        """What it is made of, so that it comes whole out of a worker process."""
+        return type(self), (self.crc,)
 
 
 class Quarantine(GliderwatchError):

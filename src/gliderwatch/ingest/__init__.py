@@ -1,0 +1,1 @@
+"""Between the file system and a decoded `model.Segment`."""

@@ -1,0 +1,59 @@
+"""What the name of a file tells: its kind and whether it is complete, never which segment it holds. Pure."""
+
+from __future__ import annotations
+
+import re
+from pathlib import PurePath
+
+_FLIGHT = {"sbd": "sbd", "mbd": "mbd", "dbd": "dbd", "scd": "sbd", "mcd": "mbd", "dcd": "dbd"}
+_SCIENCE = frozenset({"tbd", "nbd", "ebd", "tcd", "ncd", "ecd"})
+_CACHE = frozenset({"cac", "ccc"})
+_RANKS = {"sbd": 0, "mbd": 1, "dbd": 2}
+_SEGMENT = re.compile(r"(?P<glider>.+)-\d{4}-\d{1,3}-\d{1,5}-\d{1,5}", re.ASCII | re.DOTALL)
+
+
+def _suffix(name: str) -> str:
+    return PurePath(name).suffix[1:].lower()
+
+
+def kind(name: str) -> str | None:
+    """The kind of flight data a file of this name holds, compressed or not: sbd, mbd or dbd; else None.
+
+    >>> kind("01330000.SCD"), kind("usf-sam-2019-251-4-12.tbd"), kind("notes.txt")
+    ('sbd', None, None)
+    """
+    return _FLIGHT.get(_suffix(name))
+
+
+def is_science(name: str) -> bool:
+    """Whether the name is that of science data (tbd, ebd, ...), known but not used."""
+    return _suffix(name) in _SCIENCE
+
+
+def is_cache(name: str) -> bool:
+    """Whether the name is that of a cache file, the list of sensors of a factored header."""
+    return _suffix(name) in _CACHE
+
+
+def rank(kind: str) -> int:
+    """How full a kind is: the higher replaces the lower of the same segment. `KeyError` for others."""
+    return _RANKS[kind]
+
+
+def glider_of(full_name: str) -> str | None:
+    """The glider, lower case, of `<glider>-<year>-<yearday>-<mission>-<segment>`; None if it is no such name.
+
+    >>> glider_of("usf-sam-2019-251-4-12"), glider_of("Maria_997-2022-164-7-0"), glider_of("00920000")
+    ('usf-sam', 'maria_997', None)
+    """
+    match = _SEGMENT.fullmatch(full_name)
+    return match["glider"].lower() if match else None
+
+
+def is_long(name: str) -> bool:
+    """Whether a file has its long name, which a dockserver gives only to complete files.
+
+    >>> is_long("electa-2022-308-3-2.sbd"), is_long("00930002.sbd")
+    (True, False)
+    """
+    return glider_of(PurePath(name).stem) is not None
