@@ -34,6 +34,10 @@ MOVED = 3.0
 """m/s between two dives: faster than any drift, so the glider was carried."""
 WARM_UP = 3.0
 """Time constants K/gamma of the speed law: by then 95 % of an error of the first guess is gone."""
+STALE = 12 * 3600.0
+"""Seconds without a usable dive after which the sea may be another: the learner warms up anew."""
+LATEST = 12 * 3600.0
+"""Seconds for which the current of an earlier dive stands in for one that has not come yet."""
 FORGOTTEN = 6.0
 """Widths sigma behind the glider at which a basis function that was placed on the way is let go."""
 
@@ -44,7 +48,8 @@ class Estimate:
 
     ``learner`` the state of Algorithm 1 (None: no dive yet), ``centres`` of its basis functions (degrees,
     shape (N, 2): latitude, longitude), ``maxima`` of Algorithm 2, ``begun`` the start of the deployment (s),
-    ``end`` the fix that ended the last dive used.
+    ``end`` the fix that ended the last dive used, ``warm`` how much was flown since the last long gap (s),
+    ``current`` the last depth-averaged current and ``current_t`` when its dive surfaced (s).
     """
 
     learner: AdaptiveState | None = None
@@ -52,6 +57,9 @@ class Estimate:
     maxima: FlowMaxima = FlowMaxima()
     begun: float = 0.0
     end: Fix | None = None
+    warm: float = 0.0
+    current: Current | None = None
+    current_t: float = 0.0
 
 
 def learner_params(params: GliderParams) -> AdaptiveParams:
@@ -74,11 +82,29 @@ def step(state: Estimate, dive: Dive, params: GliderParams, digest: str) -> tupl
     t, basis = dive.track.t - state.begun, gains.basis(centres)
     if not learner.flown and dive.current is not None:
         learner = _with_flow(learner, dive.current, phi(dive.track.x[0], t[0], basis))
+    before = learner.flown
     learner, info = advance(learner, t, dive.track.x, dive.track.heading, basis, gains)
-    reference = (dive.current.u, dive.current.v) if dive.current is not None else None
-    maxima = update(state.maxima, info.flow_speed_max, hypot(*reference) if reference else 0.0)
-    state = Estimate(learner, places, maxima, state.begun, dive.end)
-    return state, _judged(dive, params, digest, info, state, reference)
+    reference, earlier = _reference(state, dive)
+    maxima = update(state.maxima, info.flow_speed_max, hypot(reference.u, reference.v) if reference else 0.0)
+    state = replace(
+        state,
+        learner=learner,
+        centres=places,
+        maxima=maxima,
+        end=dive.end,
+        warm=state.warm + learner.flown - before,
+        current=dive.current or state.current,
+        current_t=dive.t_surface if dive.current is not None else state.current_t,
+    )
+    return state, _judged(dive, params, digest, info, state, reference, earlier)
+
+
+def _reference(state: Estimate, dive: Dive) -> tuple[Current | None, bool]:
+    """The current to compare with, and whether it is that of an earlier dive, for want of its own."""
+    if dive.current is not None:
+        return dive.current, False
+    recent = state.current is not None and dive.t_surface - state.current_t < LATEST
+    return (state.current, True) if recent else (None, False)
 
 
 def _begin(state: Estimate, dive: Dive, start: Fix, params: GliderParams) -> Estimate:
@@ -87,13 +113,13 @@ def _begin(state: Estimate, dive: Dive, start: Fix, params: GliderParams) -> Est
         gap = dive.t_dive - state.end.t
         moved = np.hypot(*to_plane(start.lat, start.lon, state.end.lat, state.end.lon))
         if gap < DEPLOYMENT_GAP and moved < MOVED * max(gap, 600.0):
-            return state
+            return state if gap < STALE else replace(state, warm=0.0)
     believed = closure(dive.track, dive.current) if dive.track and dive.current else {}
     speed = believed.get("along_speed", dive.evidence.get("onboard_speed"))
     if speed is None or not 0.0 < speed < 2 * params.speed_max:
         speed = (params.speed_min + params.speed_max) / 2
     planned = np.array(params.estimator.centres, dtype=np.float64).reshape(-1, 2)
-    return Estimate(init(speed, len(planned)), readonly(planned), FlowMaxima(), dive.t_dive, None)
+    return Estimate(init(speed, len(planned)), readonly(planned), begun=dive.t_dive)
 
 
 def _covering(
@@ -133,14 +159,15 @@ def _judged(
     digest: str,
     info: AdaptiveInfo,
     state: Estimate,
-    reference: tuple[float, float] | None,
+    reference: Current | None,
+    earlier: bool,
 ) -> Assessment:
     """Algorithm 2 on what the learner found, or the reason why it does not judge yet."""
     flow = (float(info.flow[0]), float(info.flow[1]))
-    error = p_e(flow, reference, state.maxima) if reference is not None else None
+    error = p_e(flow, (reference.u, reference.v), state.maxima) if reference is not None else None
     notes = list(dive.notes)
     reason, verdict = "", None
-    if state.learner is not None and state.learner.flown < warm_up(params):
+    if state.warm < warm_up(params):
         reason = "warming up"
     elif reference is None and state.maxima.reference > 0.0:
         reason = "no depth-averaged current"
@@ -150,7 +177,9 @@ def _judged(
         verdict = int(
             flag(error or 0.0, params.estimator.gamma_f, info.speed, params.speed_min, params.speed_max)
         )
-    if dive.current is not None and not dive.current.final:
+    if earlier:
+        notes.append("depth-averaged current has not come: that of an earlier dive stands in")
+    elif reference is not None and not reference.final:
         notes.append("depth-averaged current is provisional")
     return replace(
         _assessment(dive, params, digest, reason),
@@ -158,9 +187,9 @@ def _judged(
         speed=info.speed,
         flow_u=flow[0],
         flow_v=flow[1],
-        reference_u=reference[0] if reference else None,
-        reference_v=reference[1] if reference else None,
-        reference_final=dive.current is not None and dive.current.final,
+        reference_u=reference.u if reference else None,
+        reference_v=reference.v if reference else None,
+        reference_final=reference is not None and reference.final and not earlier,
         p_e=error,
         clle_max=info.clle_max,
         excitation=info.excitation,
