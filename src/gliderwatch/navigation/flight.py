@@ -12,9 +12,15 @@ from gliderwatch.navigation.samples import Samples, get
 DIVING_DEPTH = 3.0
 """Metres: deeper than the pitching of a glider at the surface in waves."""
 DIVING_PITCH = 0.2
-"""Radians: a glider glides steeper than this, and lies flatter at the surface."""
+"""Radians: a glider glides steeper than this, and mostly lies flatter at the surface."""
+MOSTLY = 0.5
+"""Share of the pitches of a flight that are steep: all but those of the turns at top and bottom."""
 SPARSE = 1800.0
 """Seconds: the coarsest cadence of a real-time file; samples further apart leave a hole."""
+DENIES = 600.0
+"""Seconds between two shallow depths: too short for a dive between them that is worth the name."""
+UNDERWATER = 1
+"""Value of a Slocum's ``x_dr_state`` between its last fix before a dive and its surfacing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,42 +31,69 @@ class Flight:
     end: float
     evidence: str
 
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return self.end - self.start
+
 
 def find_flight(samples: Samples, after: float, before: float) -> Flight | None:
     """The flight between two times, or None for a drift at the surface.
 
-    Depth and pitch tell: some files hold depth only near the surface. Then the time since dead
-    reckoning began. Headings inside a hole of the depths count where no pitch is reported: at the
-    surface a glider reports none. Where only heading is there at all, all of the interval
-    is taken for flight.
+    Depth tells. Some files hold it only near the surface, or seldom: where it does not deny it, pitch
+    tells; where no pitch is reported, the state of dead reckoning; where that is not in the file
+    either, heading, which is not reported at the surface. Where only heading is there at all,
+    all of the interval is taken for flight.
     """
     depth, pitch, heading = (
         get(samples, name).between(after, before) for name in ("depth", "pitch", "heading_e")
     )
-    told = {
-        "depth": depth.t[depth.v > DIVING_DEPTH],
-        "pitch": pitch.t[np.abs(pitch.v) > DIVING_PITCH],
-        "dead reckoning": _reckoning(samples, after, before),
-    }
-    if not len(pitch):
-        told["heading"] = _in_holes(heading.t, depth, after, before)
+    told = {"depth": depth.t[depth.v > DIVING_DEPTH]}
+    if len(pitch):
+        steep = pitch.t[np.abs(pitch.v) > DIVING_PITCH]
+        told["pitch"] = _not_denied(steep, depth, after, before) if len(depth) else _mostly_steep(pitch)
+    elif (reckoning := _reckoning(samples, after, before)) is not None:
+        told["dead reckoning"] = _not_denied(reckoning, depth, after, before)
+    elif len(heading) and not len(depth):
+        return Flight(after, before, "heading")
+    else:
+        told["heading"] = _not_denied(heading.t, depth, after, before)
     times = np.concatenate(list(told.values()))
     if not len(times):
         return None
     evidence = " and ".join(name for name, t in told.items() if len(t))
-    if evidence == "heading" and not len(depth):
-        return Flight(after, before, evidence)
     return Flight(float(times.min()), float(times.max()), evidence)
 
 
-def _reckoning(samples: Samples, after: float, before: float) -> Array:
-    """Times at which the glider says that it is dead reckoning, that is under water."""
-    reckoning = get(samples, "dr_time").between(after, before)
-    return reckoning.t[reckoning.v > 0]
+def _mostly_steep(pitch: Series) -> Array:
+    """Times of steep pitches, none where most of those between them are flat: a glider in waves."""
+    steep = np.abs(pitch.v) > DIVING_PITCH
+    at = np.flatnonzero(steep)
+    flies = len(at) > 0 and steep[at[0] : at[-1] + 1].mean() > MOSTLY
+    return pitch.t[at] if flies else pitch.t[:0]
 
 
-def _in_holes(t: Array, series: Series, after: float, before: float) -> Array:
-    """Those of the times `t` that lie where `series` has no sample for longer than `SPARSE`."""
-    edges = np.concatenate([[after], series.t, [before]])
+def _reckoning(samples: Samples, after: float, before: float) -> Array | None:
+    """Times at which the glider says that it is dead reckoning under water; None: it does not say."""
+    state = get(samples, "dr_state").between(after, before)
+    if len(state):
+        return np.asarray(state.t[state.v == UNDERWATER])
+    counted = get(samples, "dr_time").between(after, before)
+    if not len(counted):
+        return None
+    grows = np.diff(counted.v) > 0.5 * np.diff(counted.t)  # its last value stays for the time at the surface
+    return np.asarray(counted.t[1:][grows])
+
+
+def _not_denied(t: Array, depth: Series, after: float, before: float) -> Array:
+    """Those of the times `t` that are not between two shallow depths at most `DENIES` apart.
+
+    At the fixes before and after the glider is at the surface.
+    """
+    if not len(depth):
+        return t
+    edges = np.concatenate([[after], depth.t, [before]])
+    shallow = np.concatenate([[True], depth.v <= DIVING_DEPTH, [True]])
     i = np.clip(np.searchsorted(edges, t, "right"), 1, len(edges) - 1)
-    return np.asarray(t[edges[i] - edges[i - 1] > SPARSE])
+    denied = shallow[i - 1] & shallow[i] & (edges[i] - edges[i - 1] <= DENIES)
+    return np.asarray(t[~denied])

@@ -18,24 +18,26 @@ SPACING = 30.0
 """Seconds: finer samples are averaged to this. A glider turns and pitches in minutes, and a
 checkpoint that carries a dive on to the next segment stays small also for 4 s data."""
 
-_KEPT = ("pitch", "roll", "depth", "depth_rate", "speed_onboard", "thruster_power", "dr_time")
-_CURRENTS = {"current": ("current_x", "current_y"), "current_final": ("current_final_x", "current_final_y")}
-_EXACT = ("fix_", "current_", "dr_", "waypoint_")
-"""Beginnings of the names of quantities whose single values matter: never averaged."""
+_KEPT = ("pitch", "roll", "depth", "speed_onboard", "dr_state", "dr_time")
+_PAIRS = (("fix_lat", "fix_lon"), ("dr_lat", "dr_lon"))
+_EXACT = ("fix_", "current_")
+"""Beginnings of the names of quantities of which every value matters."""
+_FIRST = ("dr_", "waypoint_", "gps_status", "inflections")
+"""Of those that jump, the first in each bin is kept: a mean would be a value that never was."""
 
 
 def compact(quantities: Mapping[str, Series]) -> dict[str, Series]:
     """The quantities of a segment with samples finer than `SPACING` averaged.
 
-    Angles of compass are averaged as vectors; of dead-reckoned positions one in each bin is kept, fixes
-    and currents stay whole.
+    Angles of compass are averaged as vectors; of what jumps the first in each bin is kept, fixes
+    and currents stay whole. Doing it twice changes nothing.
     """
     out = {}
     for name, series in quantities.items():
         starts = _bins(series.t)
-        if name.startswith(("fix_", "current_")) or len(starts) == len(series):
+        if name.startswith(_EXACT) or len(starts) == len(series):
             out[name] = series
-        elif name.startswith(_EXACT):
+        elif name.startswith(_FIRST):
             out[name] = Series(readonly(series.t[starts]), readonly(series.v[starts]))
         elif name.startswith("heading"):
             mean = _mean(np.exp(1j * series.v), starts)
@@ -68,23 +70,19 @@ def prepare(segment: Segment, declination: float) -> Samples:
     """What navigation needs of a segment; vectors relative to true north by `declination` (rad).
 
     Keys: ``fix_lat, fix_lon, dr_lat, dr_lon`` (degrees), ``heading_e, heading_n`` (unit vectors;
-    the commanded heading where the measured one is absent), ``current_e, current_n,
-    current_final_e, current_final_n`` (m/s), ``pitch, roll`` (rad), ``depth`` (m), ``depth_rate,
-    speed_onboard`` (m/s), ``dr_time`` (s).
+    the commanded heading where the measured one is absent), ``pitch, roll`` (rad), ``depth`` (m),
+    ``speed_onboard`` (m/s), ``dr_state``, ``dr_time`` (s).
     """
-    out = {name: segment.quantities[name] for name in _KEPT if name in segment.quantities}
-    for pair in (("dr_lat", "dr_lon"), ("fix_lat", "fix_lon")):
-        t, lat, lon = joined(segment.get(pair[0]), segment.get(pair[1]))
+    source = "heading" if len(segment.get("heading")) else "heading_commanded"
+    wanted = (*_KEPT, source, *(name for pair in _PAIRS for name in pair))
+    given = compact({name: segment.quantities[name] for name in wanted if name in segment.quantities})
+    out = {name: given[name] for name in _KEPT if name in given}
+    for pair in _PAIRS:
+        t, lat, lon = joined(given.get(pair[0], EMPTY), given.get(pair[1], EMPTY))
         _add(out, pair, t, np.stack([lat, lon], axis=-1))
-    heading = segment.get("heading")
-    if not len(heading):
-        heading = segment.get("heading_commanded")
-    _add(
-        out, ("heading_e", "heading_n"), heading.t, magnetic_to_true(heading_vectors(heading.v), declination)
-    )
-    for name, (x, y) in _CURRENTS.items():
-        t, east, north = joined(segment.get(x), segment.get(y))
-        _add(out, (f"{name}_e", f"{name}_n"), t, magnetic_to_true(np.stack([east, north], -1), declination))
+    heading = given.get(source, EMPTY)
+    vectors = magnetic_to_true(heading_vectors(heading.v), declination)
+    _add(out, ("heading_e", "heading_n"), heading.t, vectors)
     return MappingProxyType(out)
 
 

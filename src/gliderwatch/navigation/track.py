@@ -7,6 +7,7 @@ from math import atan2, degrees
 import numpy as np
 
 from gliderwatch.model import Array, Current, Fix, Series, Track, readonly
+from gliderwatch.navigation.fixes import FASTEST
 from gliderwatch.navigation.flight import SPARSE, Flight
 from gliderwatch.navigation.frame import to_plane
 from gliderwatch.navigation.samples import Samples, get
@@ -54,21 +55,26 @@ def _speed(samples: Samples, flight: Flight) -> float:
 
 
 def _onboard(samples: Samples, t: Array, flight: Flight, start: Fix) -> Array | None:
-    """The glider's own dead reckoning at times `t`, from 0 at the start of the flight; None if too sparse."""
+    """The glider's own dead reckoning at times `t`, from 0 at the start of the flight; None if too sparse.
+
+    Before its first and after its last position the glider is taken to go on at the mean rate.
+    """
     lat = get(samples, "dr_lat").between(flight.start, flight.end)
     lon = get(samples, "dr_lon").between(flight.start, flight.end)
-    duration = flight.end - flight.start
-    if (
-        len(lat) < 4
-        or lat.t[-1] - lat.t[0] < 0.8 * duration
-        or np.diff(lat.t).max() > max(SPARSE, 0.2 * duration)
-    ):
+    if len(lat) < 4:
+        return None
+    gaps, covered = np.diff(lat.t), float(lat.t[-1] - lat.t[0])
+    if covered < 0.8 * flight.duration or gaps.max() > max(SPARSE, 0.2 * flight.duration):
         return None
     xy = to_plane(lat.v, lon.v, start.lat, start.lon)
-    if np.hypot(*np.diff(xy, axis=0).T).max() > 3.0 * np.diff(lat.t).max():
+    if (np.hypot(*np.diff(xy, axis=0).T) > FASTEST * gaps + 100.0).any():
         return None  # it jumps to a fix within the flight: no dead reckoning
-    xy = xy - xy[0]
-    return np.stack([np.interp(t, lat.t, xy[:, 0]), np.interp(t, lat.t, xy[:, 1])], axis=-1)
+    rate = (xy[-1] - xy[0]) / covered
+    first = xy[0] - rate * (lat.t[0] - flight.start)
+    last = xy[-1] + rate * (flight.end - lat.t[-1])
+    times = np.concatenate([[flight.start], lat.t, [flight.end]])
+    xy = np.concatenate([[first], xy, [last]]) - first
+    return np.stack([np.interp(t, times, xy[:, 0]), np.interp(t, times, xy[:, 1])], axis=-1)
 
 
 def evidence(samples: Samples, flight: Flight, track: Track) -> dict[str, float]:
@@ -97,7 +103,8 @@ def closure(track: Track, current: Current) -> dict[str, float]:
 
     ``along_speed`` is its part along the mean heading, divided by the length of that mean: the speed that
     the glider's own flight model believes. ``across_misfit`` is the part across: near zero when
-    fixes, compass and current agree. Empty where the glider circled.
+    fixes, compass and current agree. ``across_sigma`` is how much of it a few headings in a dive
+    leave open: the standard error of their mean at that speed. Empty where the glider circled.
     """
     mean, flown = mean_heading(track)
     length = float(np.hypot(*mean))
@@ -105,9 +112,14 @@ def closure(track: Track, current: Current) -> dict[str, float]:
     if length * interval < CIRCLING * max(flown, 1.0):
         return {}
     rest = track.x[-1] / interval - np.array([current.u, current.v])
+    along = float(rest @ mean) / length**2
+    headings = track.heading[np.any(track.heading != 0, axis=1)]
+    aside = (mean[0] * headings[:, 1] - mean[1] * headings[:, 0]) / length
     return {
-        "along_speed": float(rest @ mean) / length**2,
+        "along_speed": along,
         "across_misfit": float(mean[0] * rest[1] - mean[1] * rest[0]) / length,
+        # a heading of the track is the mean of two samples, which halves their variance
+        "across_sigma": abs(along) * float(np.std(aside)) * (2 / len(aside)) ** 0.5,
     }
 
 
@@ -118,7 +130,7 @@ def _attitude(samples: Samples, flight: Flight) -> dict[str, float]:
     pitch = get(samples, "pitch").between(flight.start, flight.end)
     roll = get(samples, "roll").between(flight.start, flight.end)
     speed = get(samples, "speed_onboard").between(flight.start, flight.end)
-    if len(depth) > 3:
+    if len(depth) > 3 and np.diff(depth.t).max() < SPARSE:
         out["depth_max"] = float(depth.v.max())
     for name, part in (("pitch_dive", pitch.v[pitch.v < -0.1]), ("pitch_climb", pitch.v[pitch.v > 0.1])):
         if len(part):

@@ -24,12 +24,14 @@ FLOW_CHANGE = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Thread:
-    """The messages of one incident: the incident and the dive as last ``told``, how many messages so far."""
+    """The messages of one incident: the incident and the dive as last ``told``, how many messages so far, and
+    the latest surfacing (s) that was known at the last one."""
 
     id: str
     told: Incident
     dive: Assessment
     messages: int
+    time: float
     withdrawn: bool = False
 
 
@@ -71,19 +73,25 @@ def due(said: Said, known: Known, reminder_hours: float | None, notices: bool) -
         threads.append(thread)
         alerts += more
     old = {i.id for i in matched.values()}
-    for incident in sorted(incidents, key=lambda i: i.opened_at):
+    for incident in sorted(incidents, key=lambda i: (i.opened_at, i.id)):
         if incident.id not in old and _is_news(incident, latest):
-            thread, more = _begun(incident, known, {t.id for t in threads})
+            thread, more = _begun(incident, known, latest, {t.id for t in threads})
             threads.append(thread)
             alerts += more
     surfaced = said.surfaced
-    if notices and (surfaced is None or latest.t_surface > surfaced):
+    if notices and _is_another(latest, surfaced):
         identity = f"{latest.glider}/surfacing/{latest.t_dive:.0f}"
         before_it = known.last_surfacing(latest.t_surface - 1.0)
         previous = before_it.t_surface if before_it is not None else None
         alerts.append(message.surfacing(latest, previous, alert_id=identity))
         surfaced = latest.t_surface
     return Said(tuple(threads), surfaced), sorted(alerts, key=lambda a: a.time)
+
+
+def _is_another(dive: Assessment, surfaced: float | None) -> bool:
+    """Whether a dive ended with a later surfacing than the one that was told, whose time data that came
+    late may have moved."""
+    return surfaced is None or (dive.t_dive + dive.t_surface) / 2 > surfaced
 
 
 def _matched(threads: Iterable[Thread], incidents: tuple[Incident, ...]) -> dict[str, Incident]:
@@ -93,31 +101,34 @@ def _matched(threads: Iterable[Thread], incidents: tuple[Incident, ...]) -> dict
     free = [i for i in incidents if i not in out.values()]
     for thread in threads:
         if thread.id not in out:
-            near = [i for i in free if i.kind == thread.told.kind and _overlap(i, thread.told)]
+            near = [i for i in free if i.kind == thread.told.kind and _overlaps(i, thread.told)]
             if near:
                 out[thread.id] = near[0]
                 free.remove(near[0])
     return out
 
 
-def _overlap(a: Incident, b: Incident) -> bool:
-    forever = float("inf")
-    return a.since <= (b.cleared_at or forever) and b.since <= (a.cleared_at or forever)
+def _overlaps(now: Incident, told: Incident) -> bool:
+    """Whether an incident shares dives with one that was told, as far as that was told."""
+    until = told.cleared_at if told.cleared_at is not None else told.last.t_surface
+    return now.since <= until and (now.cleared_at is None or told.since <= now.cleared_at)
 
 
 def _is_news(incident: Incident, latest: Assessment) -> bool:
     return incident.cleared_at is None or latest.t_surface - incident.cleared_at < NEWS
 
 
-def _begun(incident: Incident, known: Known, taken: set[str]) -> tuple[Thread, list[Alert]]:
+def _begun(
+    incident: Incident, known: Known, latest: Assessment, taken: set[str]
+) -> tuple[Thread, list[Alert]]:
     identity = incident.id
     while identity in taken:
         identity += "+"
-    alert = message.opened(incident, incident.last, alert_id=identity, audience=incident.severity)
+    alert = message.opened(incident, incident.last, alert_id=f"{identity}/0", audience=incident.severity)
     alerts = [replace(alert, incident=identity)]
-    thread = Thread(identity, incident, incident.last, 1)
+    thread = Thread(identity, incident, incident.last, 1, latest.t_surface)
     if incident.cleared_at is not None:
-        thread, more = _told(thread, incident, _clearing(incident, known), "all_clear")
+        thread, more = _told(thread, incident, _clearing(incident, known), latest, "all_clear")
         alerts += more
     return thread, alerts
 
@@ -132,21 +143,21 @@ def _continued(
     thread: Thread, now: Incident | None, known: Known, latest: Assessment, reminder_hours: float | None
 ) -> tuple[Thread, list[Alert]]:
     """One thread after what is known now, and its messages."""
-    dive = known.dive(thread.dive.t_dive) or latest
+    dive = known.dive(thread.dive.t_dive) or known.last_surfacing(thread.dive.t_surface) or latest
     if now is None:
         if thread.withdrawn:
             return thread, []
-        told, alerts = _told(thread, None, dive, "correction", _why(thread, dive))
+        told, alerts = _told(thread, None, dive, latest, "correction", _why(thread, dive))
         return replace(told, withdrawn=True), alerts
     was_clear, is_clear = thread.told.cleared_at is not None, now.cleared_at is not None
     if is_clear and not was_clear and not thread.withdrawn:
-        return _told(thread, now, _clearing(now, known), "all_clear")
+        return _told(thread, now, _clearing(now, known), latest, "all_clear")
     moved = now.since != thread.told.since or now.cleared_at != thread.told.cleared_at
     if moved or thread.withdrawn or _changed(thread.dive, dive):
-        return _told(thread, now, dive, "correction", _why(thread, dive))
-    hours = (latest.t_surface - thread.dive.t_surface) / 3600
+        return _told(thread, now, dive, latest, "correction", _why(thread, dive))
+    hours = (latest.t_surface - thread.time) / 3600
     if not is_clear and reminder_hours is not None and hours >= reminder_hours:
-        return _told(thread, now, latest, "reminder")
+        return _told(thread, now, latest, latest, "reminder")
     return thread, []
 
 
@@ -170,9 +181,9 @@ def _why(thread: Thread, now: Assessment) -> str:
 
 
 def _told(
-    thread: Thread, now: Incident | None, dive: Assessment, what: str, why: str = ""
+    thread: Thread, now: Incident | None, dive: Assessment, latest: Assessment, what: str, why: str = ""
 ) -> tuple[Thread, list[Alert]]:
-    """The thread after one more message, and the message."""
+    """The thread after one more message, about a `dive`, and the message."""
     alert_id, audience = f"{thread.id}/{thread.messages}", thread.told.severity
     if what == "correction":
         alert = message.correction(thread.told, now, dive, why, alert_id=alert_id, audience=audience)
@@ -182,5 +193,5 @@ def _told(
         assert now is not None
         hours = (dive.t_surface - now.since) / 3600
         alert = message.reminder(now, dive, hours, alert_id=alert_id, audience=audience)
-    told = Thread(thread.id, now or thread.told, dive, thread.messages + 1)
+    told = Thread(thread.id, now or thread.told, dive, thread.messages + 1, latest.t_surface)
     return told, [replace(alert, incident=thread.id)]

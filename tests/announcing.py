@@ -1,0 +1,70 @@
+"""A glider's dives by letters, and what is to be said of them: for tests of `rules.announce`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from alert_support import SLOW
+from gliderwatch.model import Alert, Assessment, Incident
+from gliderwatch.params import RuleParams
+from gliderwatch.rules.announce import Said, due
+from gliderwatch.rules.incident import Watches, judge
+
+HOUR = 3600.0
+STEP = 3 * HOUR
+"""From dive to dive."""
+SPEEDS = {"0": 0.25, "1": 0.15, "S": 0.05, "2": 0.25}
+
+
+def dive(k: int, letter: str, **changes: object) -> Assessment:
+    """Dive number `k`: flags 0, 1, S (1, severe), 2, or - (assessed, no flag)."""
+    flag = {"S": 1, "-": None}.get(letter, int(letter) if letter.isdigit() else None)
+    t = k * STEP
+    made = replace(SLOW, t_dive=t, t_surface=t + 2.5 * HOUR, flag=flag, speed=SPEEDS.get(letter))
+    return replace(made, **changes)  # type: ignore[arg-type]
+
+
+@dataclass
+class World:
+    """What is known of one glider: `rules.announce.Known` over a dictionary of dives."""
+
+    dives: dict[float, Assessment]
+    rules: RuleParams = RuleParams()
+
+    @classmethod
+    def of(cls, letters: str, rules: RuleParams | None = None) -> World:
+        """The dives of some letters; a space is a dive that is not known."""
+        made = [dive(k, letter) for k, letter in enumerate(letters) if letter != " "]
+        return cls({a.t_dive: a for a in made}, rules or RuleParams())
+
+    def incidents(self) -> tuple[Incident, ...]:
+        """As the rules find them in all dives in order."""
+        state, found = Watches(), {}
+        for t in sorted(self.dives):
+            state, told = judge(state, self.dives[t], self.rules)
+            found |= {i.id: i for i in told}
+        return tuple(sorted(found.values(), key=lambda i: (i.opened_at, i.id)))
+
+    def dive(self, t_dive: float) -> Assessment | None:
+        """The dive that began at a time."""
+        return self.dives.get(t_dive)
+
+    def last_surfacing(self, until: float) -> Assessment | None:
+        """The last dive that surfaced until a time."""
+        ended = [a for a in self.dives.values() if a.t_surface <= until and a.reason != "no fix"]
+        return max(ended, key=lambda a: a.t_surface, default=None)
+
+
+class Talk:
+    """All that is said while a world becomes known."""
+
+    def __init__(self, reminder_hours: float | None = 24.0, notices: bool = False) -> None:
+        self.said, self.alerts = Said(), list[Alert]()
+        self.reminder_hours, self.notices = reminder_hours, notices
+
+    def hear(self, world: World | str) -> list[str]:
+        """The kinds of the messages that a world leads to now."""
+        known = World.of(world) if isinstance(world, str) else world
+        self.said, new = due(self.said, known, self.reminder_hours, self.notices)
+        self.alerts += new
+        return [str(a.kind) for a in new]

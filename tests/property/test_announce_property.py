@@ -1,0 +1,95 @@
+"""Whatever becomes known in whatever order: nothing is said twice, nothing that changed stays unsaid."""
+
+from dataclasses import replace
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from announcing import HOUR, STEP, Talk, World, dive
+from gliderwatch.model import Kind
+from gliderwatch.rules.announce import FLOW_CHANGE, NEWS, SPEED_CHANGE
+
+LETTERS = "0011122S-"
+append = st.tuples(st.just("append"), st.sampled_from(LETTERS), st.just(0.0))
+revise = st.tuples(st.just("revise"), st.sampled_from(LETTERS), st.floats(0.0, 1.0))
+remove = st.tuples(st.just("remove"), st.just(""), st.floats(0.0, 1.0))
+insert = st.tuples(st.just("insert"), st.sampled_from(LETTERS), st.floats(0.0, 1.0))
+current = st.tuples(st.just("current"), st.just(""), st.floats(0.0, 1.0))
+steps = st.lists(st.one_of(append, append, append, revise, remove, insert, current), max_size=40)
+
+
+def change(world: World, what: str, letter: str, where: float, step: int) -> None:
+    """One more dive, or data that come late: another flag, a dive that goes or comes, a final current."""
+    times = sorted(world.dives)
+    end = int(times[-1] // STEP) if times else -1
+    k = int(times[min(int(where * len(times)), len(times) - 1)] // STEP) if times else 0
+    if what == "append":
+        world.dives[(end + 1) * STEP] = dive(end + 1, letter)
+    elif what == "insert":
+        k = int(where * (end + 1))
+        world.dives[k * STEP] = dive(k, letter)
+    elif times and what == "revise":
+        world.dives[k * STEP] = dive(k, letter, n_samples=step)
+    elif len(times) > 1 and what == "remove":
+        del world.dives[k * STEP]
+    elif times and what == "current":
+        world.dives[k * STEP] = replace(world.dives[k * STEP], reference_u=0.1 * (step % 7))
+
+
+def check_all_is_said(talk: Talk, world: World) -> None:
+    """Each thread tells what is known, each incident that is news has one thread."""
+    latest = world.last_surfacing(float("inf"))
+    incidents = {i.id: i for i in world.incidents()}
+    live = [t for t in talk.said.threads if not t.withdrawn]
+    about = [t.told.id for t in live]
+    assert len(set(about)) == len(about) and set(about) <= set(incidents)
+    for thread in live:
+        now = incidents[thread.told.id]
+        assert (thread.told.since, thread.told.cleared_at) == (now.since, now.cleared_at)
+        known = world.dive(thread.dive.t_dive)
+        if known is not None and known.speed is not None and thread.dive.speed is not None:
+            assert known.flag == thread.dive.flag
+            assert abs(known.speed - thread.dive.speed) <= SPEED_CHANGE
+            assert abs(known.reference_u - thread.dive.reference_u) <= FLOW_CHANGE
+    for incident in incidents.values():
+        news = incident.cleared_at is None or latest.t_surface - incident.cleared_at < NEWS
+        assert not news or incident.id in about
+
+
+@settings(max_examples=200)
+@given(steps, st.sampled_from([None, 6.0, 24.0]), st.booleans())
+def test_any_history(changes, reminder_hours, notices):
+    world, talk = World({}), Talk(reminder_hours, notices)
+    spoken: dict[str, float] = {}
+    surfacings: list[float] = []
+    for step, (what, letter, where) in enumerate(changes):
+        change(world, what, letter, where, step)
+        before = len(talk.alerts)
+        talk.hear(world)
+        latest = world.last_surfacing(float("inf"))
+        for alert in talk.alerts[before:]:
+            if alert.kind == Kind.REMINDER:
+                assert latest.t_surface - spoken[alert.incident] >= reminder_hours * HOUR
+            if alert.kind == Kind.SURFACING:
+                surfacings.append(alert.time)
+            spoken[alert.incident] = latest.t_surface
+        if latest is not None:
+            check_all_is_said(talk, world)
+        said = talk.said
+        assert talk.hear(world) == [] and talk.said == said
+    ids = [a.id for a in talk.alerts]
+    assert len(set(ids)) == len(ids)
+    assert surfacings == sorted(set(surfacings))
+
+
+@settings(max_examples=100)
+@given(st.text(LETTERS, max_size=40))
+def test_heard_at_once_or_dive_by_dive_the_threads_end_alike(letters):
+    """Save what was over for a day, which is silent when heard of at once."""
+    one, by_one = Talk(), Talk()
+    one.hear(letters)
+    for n in range(1, len(letters) + 1):
+        by_one.hear(letters[:n])
+    live = {t.id: (t.told.since, t.told.cleared_at) for t in by_one.said.threads if not t.withdrawn}
+    for thread in one.said.threads:
+        assert live[thread.id] == (thread.told.since, thread.told.cleared_at)
