@@ -64,6 +64,8 @@ def _from_array(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         data = np.ascontiguousarray(value, dtype="<f8")
         return {"shape": list(value.shape), "f64": base64.b64encode(data.tobytes()).decode()}
+    if isinstance(value, np.floating):
+        return float(value)
     if hasattr(value, "keys"):
         return dict(value)
     raise NotImplementedError(f"no way to write down {type(value).__name__}")

@@ -21,9 +21,11 @@ CREATE TABLE segments (           -- what was decoded, and the state of the glid
     completeness TEXT NOT NULL,
     segment      BLOB NOT NULL,
     checkpoint   BLOB,            -- NULL where thinned out: the next older one is gone on from
+    milestone    INTEGER NOT NULL, -- 1 where the checkpoint is kept for good
     PRIMARY KEY (glider, name)
 ) STRICT;
 CREATE UNIQUE INDEX segments_in_order ON segments (glider, opened_at, name);
+CREATE INDEX segments_to_resume_from ON segments (glider, opened_at, name) WHERE checkpoint IS NOT NULL;
 
 CREATE TABLE assessments (
     glider    TEXT NOT NULL,

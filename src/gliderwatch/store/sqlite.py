@@ -3,54 +3,46 @@
 from __future__ import annotations
 
 import sqlite3
+import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from enum import StrEnum
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
 from gliderwatch.model import Alert, Assessment, Incident, Segment, SegmentId
+from gliderwatch.navigation.quality import NOT_SURFACED
+from gliderwatch.navigation.samples import compact
 from gliderwatch.pipeline import GliderState, Outcome
 from gliderwatch.rules.announce import Said
 from gliderwatch.store import codec
-from gliderwatch.store.database import connect
+from gliderwatch.store.database import connect, read_only
+from gliderwatch.store.rows import File, Status, Undelivered, file_of
+
+__all__ = ["File", "Known", "Status", "Store", "Undelivered"]
 
 RECENT = 64
-"""Newest segments of a glider that all keep their checkpoint; of the older ones one in `SPARSE` does."""
+"""Newest segments of a glider that all keep their checkpoint."""
 SPARSE = 16
+"""Of the older ones one in this many does. Its name decides, so that no order of arrival matters."""
 T = TypeVar("T")
-
-
-class Status(StrEnum):
-    """What became of a file."""
-
-    TAKEN = "taken"
-    DUPLICATE = "duplicate"
-    WAITING = "waiting"
-    QUARANTINED = "quarantined"
-    UNKNOWN = "unknown"
-
-
-@dataclass(frozen=True, slots=True)
-class File:
-    """A row of the ledger: ``reason`` says in words why it was not taken, ``crc`` the cache waited for."""
-
-    path: str
-    size: int
-    mtime_ns: int
-    status: Status
-    glider: str = ""
-    segment: str = ""
-    reason: str = ""
-    crc: str = ""
 
 
 class Store:
     """One connection to a state file; used by one thread."""
 
-    def __init__(self, path: Path | str, *, durable: bool = True) -> None:
-        self._db = connect(path, durable=durable)
+    def __init__(self, connection: sqlite3.Connection) -> None:
+        self._db = connection
+
+    @classmethod
+    def open(cls, path: Path | str, *, durable: bool = True) -> Store:
+        """The store at a path, made if need be; `durable` as in `database.connect`. Raises StateError."""
+        return cls(connect(path, durable=durable))
+
+    @classmethod
+    def reading(cls, path: Path) -> Store:
+        """The store at a path, for looking only. Raises StateError where there is none."""
+        return cls(read_only(path))
 
     def close(self) -> None:
         """Give the connection back."""
@@ -72,13 +64,18 @@ class Store:
     def file(self, path: str) -> File | None:
         """What the ledger knows of a path."""
         row = self._db.execute("SELECT * FROM files WHERE path = ?", (path,)).fetchone()
-        return _file(row) if row is not None else None
+        return file_of(row) if row is not None else None
 
     def files(self, *statuses: Status) -> list[File]:
         """The files of some statuses, by path."""
         marks = ",".join("?" * len(statuses))
         rows = self._db.execute(f"SELECT * FROM files WHERE status IN ({marks}) ORDER BY path", statuses)
-        return [_file(row) for row in rows]
+        return [file_of(row) for row in rows]
+
+    def counts(self) -> dict[Status, int]:
+        """How many files of each status the ledger holds."""
+        rows = self._db.execute("SELECT status, count(*) FROM files GROUP BY status")
+        return {Status(row[0]): row[1] for row in rows}
 
     def note(self, file: File, now: float) -> None:
         """Write what became of a file."""
@@ -107,17 +104,22 @@ class Store:
         return codec.plain_decode(row[0], tuple[int, int, str]) if row is not None else None
 
     def put(self, segment: Segment) -> SegmentId:
-        """Keep a segment in place of an earlier copy; the first id in time that this touches."""
+        """Keep a segment in place of an earlier copy; the first id in time that this touches.
+
+        What navigation would average anyway is kept as that: 4 s data would fill the state file.
+        """
+        thinned = replace(segment, quantities=compact(segment.quantities))
         key = (segment.id.glider, segment.id.name)
         old = self._db.execute("SELECT opened_at FROM segments WHERE glider = ? AND name = ?", key).fetchone()
         self._db.execute(
-            "INSERT OR REPLACE INTO segments VALUES (?, ?, ?, ?, ?, NULL)",
+            "INSERT OR REPLACE INTO segments VALUES (?, ?, ?, ?, ?, NULL, ?)",
             (
                 segment.id.glider,
                 segment.id.opened_at,
                 segment.id.name,
                 codec.plain_encode(segment.completeness),
-                codec.encode(segment),
+                codec.encode(thinned),
+                zlib.crc32(segment.id.name.encode()) % SPARSE == 0,
             ),
         )
         before = [] if old is None else [SegmentId(old[0], *key)]
@@ -154,11 +156,13 @@ class Store:
         )
 
     def thin(self, glider: str) -> None:
-        """Let go of the checkpoint that has just become old, unless it is one in `SPARSE`."""
+        """Let go of the checkpoints that are not among the `RECENT` newest, but for one in `SPARSE`."""
         self._db.execute(
-            "UPDATE segments SET checkpoint = NULL WHERE glider = ?1 AND name = (SELECT name FROM segments "
-            "WHERE glider = ?1 ORDER BY opened_at DESC, name DESC LIMIT 1 OFFSET ?2) AND rowid % ?3 != 0",
-            (glider, RECENT, SPARSE),
+            "UPDATE segments SET checkpoint = NULL "
+            "WHERE glider = ?1 AND checkpoint IS NOT NULL AND NOT milestone AND (opened_at, name) < "
+            "(SELECT opened_at, name FROM segments WHERE glider = ?1 "
+            "ORDER BY opened_at DESC, name DESC LIMIT 1 OFFSET ?2)",
+            (glider, RECENT - 1),
         )
 
     # ----------------------------------------------------------------- results
@@ -170,7 +174,7 @@ class Store:
         self._db.executemany(
             "INSERT OR REPLACE INTO assessments VALUES (?, ?, ?, ?, ?, ?)",
             [
-                (glider, a.t_dive, a.t_surface, a.reason != "no fix", a.flag, codec.plain_encode(a))
+                (glider, a.t_dive, a.t_surface, a.reason != NOT_SURFACED, a.flag, codec.plain_encode(a))
                 for a in outcome.assessments
             ],
         )
@@ -212,6 +216,15 @@ class Store:
         """The gliders of which segments are held."""
         return [r[0] for r in self._db.execute("SELECT DISTINCT glider FROM segments ORDER BY glider")]
 
+    def extent(self, glider: str) -> tuple[int, int]:
+        """How many segments and how many dives of a glider are known."""
+        row = self._db.execute(
+            "SELECT (SELECT count(*) FROM segments WHERE glider = ?1), "
+            "(SELECT count(*) FROM assessments WHERE glider = ?1)",
+            (glider,),
+        ).fetchone()
+        return row[0], row[1]
+
     # ---------------------------------------------------------------- messages
 
     def said(self, glider: str) -> Said:
@@ -247,6 +260,13 @@ class Store:
         """All messages, in the order in which they were made."""
         return self._all("SELECT data FROM alerts ORDER BY rowid", (), Alert)
 
+    def undelivered(self) -> list[Undelivered]:
+        """What waits in the outbox, oldest first."""
+        rows = self._db.execute(
+            "SELECT alert, channel, attempts, error FROM outbox WHERE delivered_at IS NULL ORDER BY id"
+        )
+        return [Undelivered(*row) for row in rows]
+
     def _all(self, sql: str, values: tuple[object, ...], kind: type[T]) -> list[T]:
         return [codec.plain_decode(row[0], kind) for row in self._db.execute(sql, values)]
 
@@ -268,8 +288,3 @@ class Known:
     def last_surfacing(self, until: float) -> Assessment | None:
         """The last dive that has ended with a fix and surfaced at `until` (s) or before."""
         return self._store.last_surfacing(self._glider, until)
-
-
-def _file(row: sqlite3.Row) -> File:
-    names = ("path", "size", "mtime_ns", "glider", "segment", "reason", "crc")
-    return File(status=Status(row["status"]), **{name: row[name] for name in names})

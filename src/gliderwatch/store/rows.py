@@ -1,0 +1,47 @@
+"""Rows of the state file as values."""
+
+from __future__ import annotations
+
+import sqlite3
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Status(StrEnum):
+    """What became of a file."""
+
+    TAKEN = "taken"
+    DUPLICATE = "duplicate"
+    WAITING = "waiting"
+    QUARANTINED = "quarantined"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class File:
+    """A row of the ledger: ``reason`` says in words why it was not taken, ``crc`` the cache waited for."""
+
+    path: str
+    size: int
+    mtime_ns: int
+    status: Status
+    glider: str = ""
+    segment: str = ""
+    reason: str = ""
+    crc: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Undelivered:
+    """A message that waits for a channel; ``error`` is the reason of the last failed attempt."""
+
+    alert: str
+    channel: str
+    attempts: int
+    error: str
+
+
+def file_of(row: sqlite3.Row) -> File:
+    """The row of the ledger."""
+    names = ("path", "size", "mtime_ns", "glider", "segment", "reason", "crc")
+    return File(status=Status(row["status"]), **{name: row[name] for name in names})

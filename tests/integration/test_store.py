@@ -1,0 +1,375 @@
+"""The state file: all or nothing, versions, what may be written twice and what may not."""
+
+import sqlite3
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from alert_support import SLOW, alert, incident
+from gliderwatch.errors import GliderwatchError
+from gliderwatch.model import Alert, Segment, SegmentId, Series, readonly
+from gliderwatch.params import GliderParams
+from gliderwatch.pipeline import GliderState, Outcome
+from gliderwatch.rules.announce import Said
+from gliderwatch.run import intake
+from gliderwatch.store import database
+from gliderwatch.store.database import SCHEMA, StateError
+from gliderwatch.store.outbox import Outbox
+from gliderwatch.store.sqlite import File, Status, Store
+from missions import Leg, cut, ending, feed, mission
+
+LEGS = [Leg(heading=0.5 * k) for k in range(6)]
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "state" / "gliderwatch.sqlite"
+
+
+@pytest.fixture
+def store(path):
+    opened = Store.open(path)
+    yield opened
+    opened.close()
+
+
+def file(name: str, status: Status = Status.TAKEN, **changes) -> File:
+    return replace(File(f"/from-glider/{name}", 10, 20, status), **changes)
+
+
+class TestOpening:
+    def test_the_folder_is_made(self, store, path):
+        assert path.exists() and store.gliders() == []
+
+    def test_what_was_written_is_there_next_time(self, path):
+        first = feed(mission(LEGS), store=Store.open(path))
+        expected = ending(first, "unit")
+        first.close()
+        assert ending(Store.open(path), "unit") == expected
+
+    def test_it_writes_ahead_and_syncs(self, store):
+        assert store._db.execute("PRAGMA journal_mode").fetchone()[0] == "wal"
+        assert store._db.execute("PRAGMA synchronous").fetchone()[0] == 2  # FULL
+        assert store._db.execute("PRAGMA foreign_keys").fetchone()[0] == 1
+
+    def test_its_schema_is_numbered(self, store):
+        assert store._db.execute("PRAGMA user_version").fetchone()[0] == SCHEMA
+
+    def test_a_newer_schema_is_refused_and_left_alone(self, store, path):
+        store._db.execute(f"PRAGMA user_version = {SCHEMA + 1}")
+        store.close()
+        before = path.read_bytes()
+        for attempt in (Store.open, Store.reading, Outbox):
+            with pytest.raises(StateError, match=rf"schema {SCHEMA + 1}.*up to {SCHEMA}: install the newer"):
+                attempt(path)
+        assert path.read_bytes() == before
+
+    def test_an_older_schema_is_migrated_step_by_step(self, store, path, monkeypatch):
+        store.note(file("a"), 0.0)
+        store.close()
+        steps = {
+            SCHEMA + 1: "CREATE TABLE extra (a INTEGER);",
+            SCHEMA + 2: "ALTER TABLE extra ADD COLUMN b INTEGER;",
+        }
+        monkeypatch.setattr(database, "SCHEMA", SCHEMA + 2)
+        monkeypatch.setattr(database, "MIGRATIONS", steps)
+        migrated = Store.open(path)
+        assert migrated._db.execute("PRAGMA user_version").fetchone()[0] == SCHEMA + 2
+        assert migrated._db.execute("SELECT a, b FROM extra").fetchall() == []
+        assert migrated.counts() == {Status.TAKEN: 1}
+
+    def test_a_migration_that_fails_changes_nothing(self, store, path, monkeypatch):
+        store.close()
+        monkeypatch.setattr(database, "SCHEMA", SCHEMA + 1)
+        monkeypatch.setattr(database, "MIGRATIONS", {SCHEMA + 1: "CREATE TABLE extra (a); NONSENSE;"})
+        with pytest.raises(StateError, match="cannot be used"):
+            Store.open(path)
+        with sqlite3.connect(path) as db:
+            assert db.execute("PRAGMA user_version").fetchone()[0] == SCHEMA
+            assert db.execute("SELECT count(*) FROM sqlite_schema WHERE name = 'extra'").fetchone()[0] == 0
+
+    def test_what_is_no_state_file_is_said(self, path):
+        path.parent.mkdir()
+        path.write_bytes(b"no database, but longer than a header of one would be" * 20)
+        for attempt in (Store.open, Store.reading):
+            with pytest.raises(StateError, match=r"gliderwatch\.sqlite"):
+                attempt(path)
+
+    def test_a_folder_that_cannot_be_made_is_said(self, tmp_path):
+        (tmp_path / "file").write_text("")
+        with pytest.raises(StateError, match=r"Choose another state\.path"):
+            Store.open(tmp_path / "file" / "state.sqlite")
+
+
+class TestReading:
+    def test_no_state_file(self, path):
+        with pytest.raises(StateError, match="has the daemon run"):
+            Store.reading(path)
+        assert not path.exists()
+
+    def test_it_sees_and_cannot_write(self, store, path):
+        store.note(file("a"), 0.0)
+        reader = Store.reading(path)
+        assert reader.counts() == {Status.TAKEN: 1}
+        with pytest.raises(sqlite3.OperationalError, match="readonly"):
+            reader.note(file("b"), 0.0)
+        store.note(file("b"), 0.0)
+        assert reader.counts() == {Status.TAKEN: 2}  # beside the daemon that writes
+
+
+def tables(store: Store) -> dict[str, list]:
+    names = [r[0] for r in store._db.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")]
+    return {n: [tuple(r) for r in store._db.execute(f"SELECT * FROM {n}")] for n in names}
+
+
+class TestTransaction:
+    """Each input leads to all of its rows or to none."""
+
+    @pytest.mark.parametrize("step", ["put", "apply", "checkpoint", "thin", "say"])
+    def test_whatever_fails_on_the_way_leaves_nothing(self, store, monkeypatch, step):
+        speaking = intake.Speaking(channels=lambda a: ["mail"], notices=lambda g: True)
+        feed(mission(LEGS)[:3], speaking=speaking, store=store)
+        before = tables(store)
+        whole = getattr(Store, step)
+
+        def breaks(self, *args):
+            whole(self, *args)
+            raise KeyboardInterrupt  # as of a signal, not only what an error handler would catch
+
+        monkeypatch.setattr(Store, step, breaks)
+        with pytest.raises(KeyboardInterrupt):
+            feed(mission(LEGS)[3:4], speaking=speaking, store=store)
+        assert tables(store) == before
+        monkeypatch.undo()
+        feed(mission(LEGS)[3:4], speaking=speaking, store=store)
+        assert len(store.assessments("unit")) == 4
+
+    def test_a_process_that_dies_leaves_nothing(self, path):
+        feed(mission(LEGS)[:3], store=Store.open(path)).close()
+        code = (
+            "import os, sys\n"
+            "from pathlib import Path\n"
+            "from gliderwatch.store.sqlite import File, Status, Store\n"
+            "store = Store.open(Path(sys.argv[1]))\n"
+            "with store.transaction():\n"
+            "    store.note(File('/x', 1, 1, Status.TAKEN), 0.0)\n"
+            "    store._db.execute('DELETE FROM assessments')\n"
+            "    os._exit(9)\n"
+        )
+        done = subprocess.run([sys.executable, "-c", code, str(path)], check=False, timeout=60)
+        assert done.returncode == 9
+        after = Store.open(path)
+        assert len(after.assessments("unit")) == 3 and after.file("/x") is None
+
+    def test_a_reader_sees_all_of_it_or_nothing(self, store, path):
+        reader = Store.reading(path)
+        with store.transaction():
+            store.note(file("a"), 0.0)
+            assert reader.counts() == {}
+        assert reader.counts() == {Status.TAKEN: 1}
+
+
+class TestLedger:
+    def test_a_file_comes_back(self, store):
+        waiting = file("a", Status.WAITING, glider="g", segment="s", reason="why", crc="abc")
+        store.note(waiting, 5.0)
+        assert store.file(waiting.path) == waiting and store.file("/other") is None
+
+    def test_the_last_word_on_a_file_counts(self, store):
+        store.note(file("a", Status.WAITING), 1.0)
+        store.note(file("a", Status.TAKEN), 2.0)
+        assert store.counts() == {Status.TAKEN: 1}
+
+    def test_files_by_status(self, store):
+        for k, status in enumerate(Status):
+            store.note(file(f"{9 - k}", status), 0.0)
+        assert [f.status for f in store.files(Status.WAITING, Status.UNKNOWN)] == [
+            Status.UNKNOWN,
+            Status.WAITING,
+        ]
+        assert store.files() == []
+
+    def test_only_known_states(self, store):
+        with pytest.raises(sqlite3.IntegrityError):
+            store._db.execute("INSERT INTO files VALUES ('/x', 1, 1, 'lost', '', '', '', '', 0)")
+
+
+class TestSegments:
+    def test_a_segment_comes_back(self, store):
+        s = mission(LEGS)[0]
+        assert store.put(s) == s.id
+        back = store.segment(s.id)
+        assert back.id == s.id and back.get("depth").v.tolist() == s.get("depth").v.tolist()
+        assert store.completeness("unit", s.id.name) == s.completeness
+        assert store.completeness("unit", "other") is None
+
+    def test_dense_data_are_kept_thinned_and_lead_to_the_same(self, store):
+        """4 s data, as of a file that was recovered with the glider."""
+        rng = np.random.default_rng(0)
+        made = [_dense(s, rng) for s in mission(LEGS[:3])]
+        first = feed(made, store=store)
+        kept = store.segment(made[1].id)
+        assert len(kept.get("pitch")) < len(made[1].get("pitch")) / 6
+        assert kept.get("fix_lat").t.tolist() == made[1].get("fix_lat").t.tolist()
+        assert kept.completeness == made[1].completeness
+        again = feed([made[2], made[1], made[0]])
+        assert ending(again, "unit") == ending(first, "unit")
+
+    def test_a_fuller_copy_replaces_it_from_its_time_on(self, store):
+        s = mission(LEGS)[2]
+        store.put(cut(s, s.id.opened_at + 3000))
+        assert store.put(s) == s.id
+        assert store.completeness("unit", s.id.name) == s.completeness
+        assert store.extent("unit") == (1, 0)
+
+    def test_a_copy_opened_at_another_time_touches_both(self, store):
+        """The clock was set between two copies."""
+        s = mission(LEGS)[2]
+        store.put(s)
+        later = replace(s, id=replace(s.id, opened_at=s.id.opened_at + 60))
+        assert store.put(later) == s.id
+        assert store.put(s) == s.id
+
+    def test_it_goes_on_from_the_newest_checkpoint_before(self, store):
+        made = mission(LEGS)
+        feed(made, store=store)
+        state, todo = store.resume(made[3].id)
+        assert todo == [s.id for s in made[3:]]
+        assert state.navigation.last_t == made[2].last_t
+        assert store.resume(made[0].id) == (GliderState(), [s.id for s in made])
+
+    def test_each_glider_for_itself(self, store):
+        made = mission(LEGS)
+        feed(made, store=store)
+        assert store.resume(SegmentId(0.0, "other", "")) == (GliderState(), [])
+        assert store.gliders() == ["unit"]
+
+
+def _dense(s: Segment, rng: np.random.Generator) -> Segment:
+    """The segment with pitch, heading and depth every 4 s, and noise on them."""
+    held = dict(s.quantities)
+    for name in ("pitch", "heading", "depth"):
+        t = np.arange(held[name].t[0], held[name].t[-1], 4.0)
+        v = np.interp(t, held[name].t, held[name].v) + rng.normal(0.0, 0.01, len(t))
+        held[name] = Series(readonly(t), readonly(v))
+    return replace(s, quantities=held)
+
+
+class TestResults:
+    def test_new_results_replace_those_from_their_time_on(self, store):
+        a = [replace(SLOW, t_dive=100.0 * k, t_surface=100.0 * k + 50) for k in range(4)]
+        store.apply("electa", Outcome(GliderState(), float("-inf"), tuple(a), ()))
+        changed = replace(a[2], speed=0.2)
+        store.apply("electa", Outcome(GliderState(), 200.0, (changed,), ()))
+        assert store.assessments("electa") == [a[0], a[1], changed]
+
+    def test_incidents_opened_later_go(self, store):
+        made = [incident(id=f"electa/anomaly/{k}", opened_at=100.0 * k) for k in range(3)]
+        store.apply("electa", Outcome(GliderState(), float("-inf"), (), tuple(made)))
+        cleared = replace(made[1], cleared_at=150.0)
+        store.apply("electa", Outcome(GliderState(), 100.0, (), (cleared,)))
+        assert store.incidents("electa") == [made[0], cleared]
+
+    def test_a_dive_that_has_not_ended_is_no_surfacing(self, store):
+        known = store.known("electa")
+        ended = replace(SLOW, t_dive=0.0, t_surface=50.0)
+        lost = replace(SLOW, t_dive=100.0, t_surface=150.0, reason="data missing: 1 of 2 h")
+        under_way = replace(SLOW, t_dive=200.0, t_surface=250.0, reason="no fix", flag=None)
+        store.apply("electa", Outcome(GliderState(), float("-inf"), (ended, lost, under_way), ()))
+        assert known.last_surfacing(1e9) == lost
+        assert known.last_surfacing(149.0) == ended and known.last_surfacing(0.0) is None
+        assert known.dive(200.0) == under_way and known.dive(1.0) is None
+
+
+class TestMessages:
+    def test_what_was_said_comes_back(self, store):
+        assert store.said("unit") == Said()
+        speaking = intake.Speaking(channels=lambda a: ["mail"], notices=lambda g: True)
+        feed(mission(LEGS), speaking=speaking, store=store)
+        assert store.said("unit").surfaced is not None
+        assert [a.kind for a in store.alerts()] == ["surfacing"] * 6
+
+    def test_a_message_is_kept_once(self, store):
+        for _ in range(2):
+            store.post(alert(), ["mail", "slack"], 0.0)
+        store.post(alert(title="another text"), ["mail", "phone"], 0.0)
+        assert [a.title for a in store.alerts()] == [alert().title]
+        assert [u.channel for u in store.undelivered()] == ["mail", "slack", "phone"]
+
+    def test_no_second_row_for_a_channel(self, store):
+        store.post(alert(), ["mail"], 0.0)
+        with pytest.raises(sqlite3.IntegrityError, match="UNIQUE"):
+            store._db.execute("INSERT INTO outbox (alert, channel, incident) VALUES ('a1', 'mail', '')")
+
+    def test_no_row_without_its_message(self, store):
+        with pytest.raises(sqlite3.IntegrityError, match="FOREIGN KEY"):
+            store._db.execute("INSERT INTO outbox (alert, channel, incident) VALUES ('zz', 'mail', '')")
+
+    def test_a_delivered_message_is_not_sent_again(self, store, path):
+        store.post(alert(), ["mail"], 0.0)
+        outbox = Outbox(path)
+        (row,) = outbox.due(0.0)
+        outbox.delivered(row.id, 1.0)
+        store.post(alert(), ["mail"], 2.0)
+        assert outbox.due(1e9) == [] and store.undelivered() == []
+
+
+class TestOutbox:
+    def made(self, store, path, *alerts: Alert) -> Outbox:
+        for a in alerts:
+            store.post(a, ["mail"], 0.0)
+        return Outbox(path)
+
+    def test_a_thread_keeps_its_order(self, store, path):
+        outbox = self.made(store, path, alert("a/0"), alert("a/1"), alert("b/0", incident="other"))
+        first = outbox.due(0.0)
+        assert [r.alert.id for r in first] == ["a/0", "b/0"]
+        outbox.failed(first[0].id, "down", next_try=100.0)
+        assert [r.alert.id for r in outbox.due(50.0)] == ["b/0"]
+        outbox.delivered(first[0].id, 100.0)
+        assert [r.alert.id for r in outbox.due(100.0)] == ["a/1", "b/0"]
+
+    def test_messages_without_a_thread_wait_for_none(self, store, path):
+        outbox = self.made(store, path, alert("s/0", incident=""), alert("s/1", incident=""))
+        assert [r.alert.id for r in outbox.due(0.0)] == ["s/0", "s/1"]
+
+    def test_attempts_are_counted_with_their_reason(self, store, path):
+        outbox = self.made(store, path, alert())
+        (row,) = outbox.due(0.0)
+        for k in range(3):
+            outbox.failed(row.id, f"refused {k}", next_try=float(k))
+        assert [(u.alert, u.attempts, u.error) for u in store.undelivered()] == [("a1", 3, "refused 2")]
+        assert outbox.due(10.0)[0].attempts == 3
+
+    def test_it_comes_back_as_it_was(self, store, path):
+        (row,) = self.made(store, path, alert()).due(0.0)
+        assert row.alert == alert() and row.channel == "mail"
+
+    def test_each_has_its_own_connection(self, store, path):
+        """The dispatcher's thread and the daemon's write in turn."""
+        outbox = self.made(store, path, alert())
+        with store.transaction():
+            store.note(file("a"), 0.0)
+        outbox.delivered(outbox.due(0.0)[0].id, 0.0)
+        with store.transaction():
+            store.note(file("b"), 0.0)
+        outbox.close()
+        assert store.undelivered() == []
+
+
+def test_a_duplicate_is_noted_and_changes_nothing(store):
+    made = mission(LEGS)
+    feed(made, store=store)
+    before = ending(store, "unit")
+    again = File("/again", 1, 1, Status.WAITING)
+    taken = intake.take(store, again, made[2], GliderParams(), None, 0.0)
+    assert taken.file.status == Status.DUPLICATE and "fuller copy" in taken.file.reason
+    assert ending(store, "unit") == before and store.counts()[Status.DUPLICATE] == 1
+
+
+def test_all_errors_are_of_one_kind(path):
+    with pytest.raises(GliderwatchError):
+        Store.reading(path)
