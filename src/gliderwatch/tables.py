@@ -41,7 +41,9 @@ def _vector(u: float | None, v: float | None) -> str:
 def dives(assessments: Sequence[Assessment]) -> Table:
     """The dives of a mission, one a line; 80 columns."""
     years = sorted({iso(a.t_surface)[:4] for a in assessments})
-    table = Table(f"{'/'.join(years)} UTC", "h", box=None, pad_edge=False, header_style="bold")
+    table = Table(
+        f"{'/'.join(years)} UTC", "h", box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold"
+    )
     table.add_column("flag", max_width=14)
     for column in table.columns:
         column.no_wrap = True

@@ -15,39 +15,55 @@ from gliderwatch.store.sqlite import File, Status, Store
 DONE = (Status.TAKEN, Status.DUPLICATE, Status.QUARANTINED)
 
 
-def seen(path: Path) -> File:
-    """The file as it lies there now, not judged yet; without size and time where it is gone."""
+def state(path: Path) -> tuple[int, int] | None:
+    """Size (bytes) and time of change (ns) of a file; None where there is none, zeros where it is closed."""
     try:
         status = path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
     except OSError:
-        return File(str(path), 0, 0, Status.WAITING)
-    return File(str(path), status.st_size, status.st_mtime_ns, Status.WAITING)
+        return 0, 0
+    return status.st_size, status.st_mtime_ns
 
 
 def judge(
-    file: File, store: Store, caches: Sequence[Path], is_known: Callable[[str], bool]
+    path: Path, store: Store, caches: Sequence[Path], is_known: Callable[[str], bool]
 ) -> Job | File | None:
     """A job where the file is to be decoded, a row for the ledger where not, None where nothing is new.
 
     Reads nothing but the header, which takes well under a millisecond.
     """
-    before = store.file(file.path)
-    if before is not None and (before.size, before.mtime_ns) == (file.size, file.mtime_ns):
-        if before.status in DONE or (before.crc and find_cache(before.crc, caches) is None):
-            return None
-        if before.status == Status.UNKNOWN and before.glider and not is_known(before.glider):
-            return None
+    now, before = state(path), store.file(_text(path))
+    if now is None:
+        return _gone(before, store, is_known)
+    if before is not None and (before.size, before.mtime_ns) == now and _is_settled(before, caches, is_known):
+        return None
+    file = File(_text(path), *now, Status.WAITING)
     try:
-        header = read_header(Path(file.path))
+        header = read_header(_plain(path))
     except (Quarantine, Retry) as error:
         return failed(file, error)
     file = replace(file, glider=header.id.glider, segment=header.id.name)
     if not is_known(header.id.glider):
         reason = f"glider {header.id.glider} is not in the configuration"
         return replace(file, status=Status.UNKNOWN, reason=reason)
-    if header.factored and find_cache(header.crc, caches) is None:
+    if header.factored and _is_missing(header.crc, caches):
         return failed(file, MissingCache(header.crc))
     return Job(file, header)
+
+
+def _is_settled(before: File, caches: Sequence[Path], is_known: Callable[[str], bool]) -> bool:
+    """Whether nothing more can be done for a file that has not changed."""
+    if before.status == Status.UNKNOWN:
+        return bool(before.glider) and not is_known(before.glider)
+    return before.status in DONE or (bool(before.crc) and _is_missing(before.crc, caches))
+
+
+def _plain(path: Path) -> Path:
+    """The path, if its name can be kept. Raises Quarantine."""
+    if str(path) != _text(path):
+        raise Quarantine("its name is not UTF-8 text: give it another one")
+    return path
 
 
 def failed(file: File, error: Exception) -> File:
@@ -57,3 +73,28 @@ def failed(file: File, error: Exception) -> File:
     if isinstance(error, Retry):
         return replace(file, status=Status.WAITING, reason=str(error), crc="")
     return replace(file, status=Status.QUARANTINED, reason=str(error), crc="")
+
+
+def _gone(before: File | None, store: Store, is_known: Callable[[str], bool]) -> File | None:
+    """A file that waited and is not there any more: it was renamed, or taken away."""
+    if before is None or before.status in DONE:
+        return None
+    if before.status == Status.UNKNOWN and not is_known(before.glider):
+        return None
+    if store.completeness(before.glider, before.segment) is None:
+        reason = "is not there any more, and its segment has not come under another name"
+        return replace(before, status=Status.WAITING, reason=reason, crc="")
+    return replace(before, status=Status.DUPLICATE, reason="was renamed", crc="")
+
+
+def _is_missing(crc: str, caches: Sequence[Path]) -> bool:
+    """Whether a cache file is in none of the folders; where one cannot be read, the decoder tells why."""
+    try:
+        return find_cache(crc, caches) is None
+    except OSError:
+        return False
+
+
+def _text(path: Path) -> str:
+    """The path as text that can be kept, whatever bytes are in its name."""
+    return str(path).encode("utf-8", "backslashreplace").decode()

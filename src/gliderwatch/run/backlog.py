@@ -10,6 +10,9 @@ from gliderwatch.ingest.header import Header
 from gliderwatch.model import Segment
 from gliderwatch.store.sqlite import File
 
+AHEAD = 16
+"""Files of one glider that may be decoded, or done with it, before the first of them is taken."""
+
 
 @dataclass(slots=True)
 class Job:
@@ -30,12 +33,13 @@ class Backlog:
     """Oldest first within each glider, so that nothing has to be taken back; gliders take turns.
 
     One glider with a month of files delays no other, and one file that takes long to decode delays its own
-    glider alone.
+    glider alone. ``decoding`` counts the files that are being decoded.
     """
 
     def __init__(self) -> None:
         self._queues: OrderedDict[str, _Queue] = OrderedDict()
         self._paths: set[str] = set()
+        self.decoding = 0
 
     def __len__(self) -> int:
         return len(self._paths)
@@ -49,17 +53,23 @@ class Backlog:
         heapq.heappush(queue.waiting, (job.header.id.opened_at, job.header.id.name, job.file.path, job))
 
     def next(self) -> Job | None:
-        """The file to decode next, None when all are being decoded."""
+        """The file to decode next, None when there is none."""
         for glider, queue in self._queues.items():
-            if queue.waiting:
+            if queue.waiting and len(queue.decoding) < AHEAD:
                 job = heapq.heappop(queue.waiting)[-1]
                 queue.decoding.append(job)
                 self._queues.move_to_end(glider)
+                self.decoding += 1
                 return job
         return None
 
+    def finish(self, job: Job, result: Segment | Exception) -> None:
+        """Note what became of a file that was being decoded."""
+        job.result = result
+        self.decoding -= 1
+
     def decoded(self, glider: str) -> Job | None:
-        """The next file of a glider to take: decoded, and none before it still being decoded."""
+        """The next file of a glider to take, which leaves: decoded, and none before it is still in work."""
         queue = self._queues.get(glider)
         if queue is None or not queue.decoding or queue.decoding[0].result is None:
             return None

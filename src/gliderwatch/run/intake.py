@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
+from gliderwatch.errors import GliderwatchError, Quarantine
 from gliderwatch.model import Alert, Assessment, Segment
 from gliderwatch.params import GliderParams
-from gliderwatch.pipeline import process
+from gliderwatch.pipeline import GliderState, Outcome, process
 from gliderwatch.rules.announce import due
 from gliderwatch.store.sqlite import File, Status, Store
 
@@ -29,13 +30,25 @@ class Taken:
     alerts: tuple[Alert, ...] = ()
 
 
+class StoppedError(GliderwatchError):
+    """The daemon ends while an input is taken in: nothing of it is kept, the next start takes it again."""
+
+
 def take(
-    store: Store, file: File, segment: Segment, params: GliderParams, speaking: Speaking | None, now: float
+    store: Store,
+    file: File,
+    segment: Segment,
+    params: GliderParams,
+    speaking: Speaking | None,
+    now: float,
+    stopping: Callable[[], bool] = lambda: False,
 ) -> Taken:
     """Put a segment in its place and go on from the checkpoint before it; say what is to be said.
 
     A copy that holds no more than the one known is only noted. `speaking` is None while more files of the
     glider are at hand: then the last of them speaks for all. `now` (s) dates the rows, and decides nothing.
+    Raises Quarantine for a segment that cannot be assessed, StoppedError once `stopping` holds; then
+    nothing has changed.
     """
     glider = segment.id.glider
     with store.transaction():
@@ -46,7 +59,7 @@ def take(
             return Taken(file, alerts=_speak(store, glider, params, speaking, now))
         file = replace(file, status=Status.TAKEN, reason="")
         store.note(file, now)
-        assessments = _run(store, segment, params)
+        assessments = _run(store, segment, params, stopping)
         alerts = _speak(store, glider, params, speaking, now)
     return Taken(file, assessments, alerts)
 
@@ -67,11 +80,15 @@ def speak(
         return _speak(store, glider, params, speaking, now)
 
 
-def _run(store: Store, segment: Segment, params: GliderParams) -> tuple[Assessment, ...]:
+def _run(
+    store: Store, segment: Segment, params: GliderParams, stopping: Callable[[], bool]
+) -> tuple[Assessment, ...]:
     state, todo = store.resume(store.put(segment))
     dives: dict[float, Assessment] = {}
     for identity in todo:
-        outcome = process(state, segment if identity == segment.id else store.segment(identity), params)
+        if stopping():
+            raise StoppedError(f"{segment.id.name} was not taken in: the daemon ends")
+        outcome = _process(state, segment if identity == segment.id else store.segment(identity), params)
         store.apply(identity.glider, outcome)
         store.checkpoint(identity, outcome.state)
         state = outcome.state
@@ -80,6 +97,15 @@ def _run(store: Store, segment: Segment, params: GliderParams) -> tuple[Assessme
         }
     store.thin(segment.id.glider)
     return tuple(dives.values())
+
+
+def _process(state: GliderState, segment: Segment, params: GliderParams) -> Outcome:
+    """`process`, in which one segment of unforeseen content must not stop all gliders for good."""
+    try:
+        return process(state, segment, params)
+    except Exception as error:
+        what = f"{type(error).__name__}: {error}"
+        raise Quarantine(f"cannot be assessed, please report it ({segment.id.name}: {what})") from error
 
 
 def _speak(

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import logging
 import sys
+from collections.abc import Iterable
 
 import structlog
+
+from gliderwatch.model import Alert
+from gliderwatch.run.intake import Taken
+
+log = structlog.get_logger(__name__)
 
 
 def configure() -> None:
@@ -25,3 +31,22 @@ def configure() -> None:
         logger_factory=structlog.WriteLoggerFactory(file=sys.stderr),
         cache_logger_on_first_use=True,
     )
+
+
+def taken(input_: Taken) -> None:
+    """What became of a file."""
+    file = input_.file
+    log.info(
+        f"file {file.status}",
+        path=file.path,
+        glider=file.glider,
+        segment=file.segment,
+        **({"reason": file.reason} if file.reason else {}),
+        **({"dives": len(input_.assessments)} if input_.assessments else {}),
+    )
+
+
+def alerts(made: Iterable[Alert]) -> None:
+    """Messages that are on their way."""
+    for alert in made:
+        log.warning("alert", glider=alert.glider, kind=str(alert.kind), alert=alert.id, title=alert.title)

@@ -8,13 +8,13 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gliderwatch.alerts.channels import Channel
 from gliderwatch.alerts.outbox import Dispatcher
 from gliderwatch.config import Config, expand
-from gliderwatch.errors import GliderwatchError
+from gliderwatch.errors import GliderwatchError, Quarantine, Retry
 from gliderwatch.ingest import names
 from gliderwatch.ingest.decode import Decoder
 from gliderwatch.model import Segment
@@ -22,12 +22,15 @@ from gliderwatch.params import GliderParams
 from gliderwatch.run import arrivals, intake
 from gliderwatch.run.backlog import Job
 from gliderwatch.run.intake import Speaking
+from gliderwatch.run.life import alive_path
 from gliderwatch.run.lines import alert_line, assessment_line, write_lines
 from gliderwatch.run.speaking import NOBODY, speaking
 from gliderwatch.store.database import MEMORY
 from gliderwatch.store.outbox import Outbox
 from gliderwatch.store.sqlite import Status, Store
 
+STATE = "replay.sqlite"
+"""Name of the state file in the folder of results: another one than a daemon's usual."""
 SEND_PATIENCE = 120.0
 """Seconds that `--send` waits at the end for messages to be delivered."""
 
@@ -82,6 +85,7 @@ def replay(
         report = Report(Store.open(path, durable=False))
         with _speaking(request, path, report) as told:
             jobs = _triage(files, report, caches, request, on_file)
+            _check_glider(request, jobs, report.store)
             for job in _decoded(jobs, caches, workers):
                 _take(job, report, request, told, on_file)
         if request.out is not None:
@@ -119,16 +123,25 @@ def cache_folders(request: Request) -> list[Path]:
 def _state(request: Request) -> Iterator[Path | str]:
     """Where the replay keeps its state: never where the daemon does."""
     if request.out is not None:
-        request.out.mkdir(parents=True, exist_ok=True)
-        path = request.out / "state.sqlite"
-        for old in (path, *request.out.glob("state.sqlite-*")):
-            old.unlink(missing_ok=True)  # of an earlier replay: this one starts from nothing
-        yield path
+        yield _fresh(request.out / STATE, request.config)
     elif request.send:
         with tempfile.TemporaryDirectory(prefix="gliderwatch-") as folder:
             yield Path(folder) / "state.sqlite"
     else:
         yield MEMORY
+
+
+def _fresh(path: Path, config: Config | None) -> Path:
+    """A state file of which nothing is there: what an earlier replay left is removed."""
+    if alive_path(path).exists() or (config is not None and path.resolve() == Path(config.state.path)):
+        raise GliderwatchError(f"{path} is the state of a daemon: choose another folder for --out")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        for old in (path, *path.parent.glob(f"{path.name}-*")):
+            old.unlink(missing_ok=True)
+    except OSError as error:
+        raise GliderwatchError(f"{path} cannot be written: {error.strerror}") from None
+    return path
 
 
 @contextmanager
@@ -142,13 +155,15 @@ def _speaking(request: Request, path: Path | str, report: Report) -> Iterator[Sp
     outbox = Path(path)
     dispatcher = Dispatcher(lambda: Outbox(outbox), channels, time.time, wake)
     dispatcher.start()
-    yield speaking(config)
-    deadline = time.monotonic() + SEND_PATIENCE
-    while (left := report.store.undelivered()) and time.monotonic() < deadline:
-        wake.set()
-        time.sleep(0.05)
-    dispatcher.stop()
-    report.undelivered = len(left)
+    try:
+        yield speaking(config)
+        deadline = time.monotonic() + SEND_PATIENCE
+        while report.store.undelivered() and time.monotonic() < deadline:
+            wake.set()
+            time.sleep(0.05)
+    finally:
+        dispatcher.stop()
+    report.undelivered = len(report.store.undelivered())
 
 
 def _silent(config: Config) -> Speaking:
@@ -166,12 +181,22 @@ def _triage(
     """The files to decode in the order of time, the fullest copy of a segment first."""
     jobs = []
     for path in files:
-        found = arrivals.judge(arrivals.seen(path), report.store, caches, request.is_wanted)
+        found = arrivals.judge(path, report.store, caches, request.is_wanted)
         if isinstance(found, Job):
             jobs.append(found)
         elif found is not None:
+            if found.status == Status.UNKNOWN and request.glider is not None:
+                found = replace(found, reason=f"of {found.glider}, not of {request.glider}")
             _count(intake.note(report.store, found, GliderParams(), None, time.time()), report, on_file)
     return sorted(jobs, key=lambda j: (j.header.id, -names.rank(j.header.kind), j.file.path))
+
+
+def _check_glider(request: Request, jobs: Sequence[Job], store: Store) -> None:
+    """Raises GliderwatchError where the glider asked for has no files, but others have."""
+    others = sorted({file.glider for file in store.files(Status.UNKNOWN)})
+    asked = {job.header.id.glider for job in jobs} | {f.glider for f in store.files(Status.WAITING)}
+    if request.glider is not None and others and request.glider not in asked:
+        raise GliderwatchError(f"no files of glider {request.glider}, but of: {', '.join(others)}")
 
 
 def _decoded(jobs: Sequence[Job], caches: Sequence[Path], workers: int) -> Iterator[Job]:
@@ -190,10 +215,11 @@ def _take(
     on_file: Callable[[intake.Taken], None],
 ) -> None:
     params = request.params(job.header.id.glider)
-    if isinstance(job.result, Segment):
+    try:
+        if not isinstance(job.result, Segment):
+            raise job.result if job.result is not None else Retry("was not decoded")
         taken = intake.take(report.store, job.file, job.result, params, told, time.time())
-    else:
-        error = job.result if job.result is not None else GliderwatchError("was not decoded")
+    except (Quarantine, Retry) as error:
         taken = intake.note(report.store, arrivals.failed(job.file, error), params, told, time.time())
     _count(taken, report, on_file)
 

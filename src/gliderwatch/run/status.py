@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from gliderwatch.config import Config
 from gliderwatch.model import Assessment, Incident
-from gliderwatch.run.daemon import BEAT, alive_path
+from gliderwatch.run.life import STALE, is_held, silence
 from gliderwatch.run.lines import assessment_line, iso
 from gliderwatch.store.sqlite import File, Status, Store, Undelivered
-
-STALE = 6 * BEAT
-"""Seconds without a sign of life after which the daemon is taken for dead."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +27,9 @@ class GliderStatus:
 
 @dataclass(frozen=True, slots=True)
 class Overview:
-    """All that `status` tells. ``silent_for`` (s): since the last sign of life, None: never one."""
+    """All that `status` tells: whether the daemon is ``running``, since when it is silent (s; None: ever)."""
 
+    running: bool
     silent_for: float | None
     gliders: tuple[GliderStatus, ...]
     files: dict[Status, int]
@@ -43,8 +40,8 @@ class Overview:
 
     @property
     def alive(self) -> bool:
-        """Whether the daemon gave a sign of life lately."""
-        return self.silent_for is not None and self.silent_for < STALE
+        """Whether the daemon runs and gave a sign of life lately."""
+        return self.running and self.silent_for is not None and self.silent_for < STALE
 
 
 def overview(config: Config) -> Overview:
@@ -54,7 +51,8 @@ def overview(config: Config) -> Overview:
     try:
         names = sorted({*config.gliders, *store.gliders()})
         return Overview(
-            silent_for=_silence(path),
+            running=is_held(path),
+            silent_for=silence(path),
             gliders=tuple(_glider(store, name, name in config.gliders) for name in names),
             files=store.counts(),
             waiting=tuple(store.files(Status.WAITING)),
@@ -64,13 +62,6 @@ def overview(config: Config) -> Overview:
         )
     finally:
         store.close()
-
-
-def _silence(state: Path) -> float | None:
-    try:
-        return max(0.0, time.time() - alive_path(state).stat().st_mtime)
-    except OSError:
-        return None
 
 
 def _glider(store: Store, name: str, configured: bool) -> GliderStatus:

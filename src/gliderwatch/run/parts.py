@@ -1,0 +1,109 @@
+"""What the daemon is made of: everything that follows from one configuration, replaced as a whole."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from queue import SimpleQueue
+
+from gliderwatch.alerts.channels import Channel
+from gliderwatch.alerts.outbox import Dispatcher
+from gliderwatch.config import Config
+from gliderwatch.ingest.decode import Decoder
+from gliderwatch.ingest.settle import Settling
+from gliderwatch.ingest.watch import Change, Watcher
+from gliderwatch.model import Segment
+from gliderwatch.run.backlog import Backlog, Job
+from gliderwatch.run.intake import Speaking
+from gliderwatch.run.speaking import speaking
+from gliderwatch.store.outbox import Outbox
+
+
+@dataclass(frozen=True, slots=True)
+class Decoded:
+    """News of the decoder: a job of a backlog is done."""
+
+    backlog: Backlog
+    job: Job
+    future: Future[Segment]
+
+
+News = Change | Decoded | signal.Signals
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """A configuration and what works by it. ``urls`` (with their secrets) tell whether channels changed."""
+
+    config: Config
+    news: SimpleQueue[News]
+    workers: int
+    speaking: Speaking
+    settling: Settling
+    watcher: Watcher
+    decoder: Decoder
+    backlog: Backlog
+    dispatcher: Dispatcher
+    urls: dict[str, str] = field(repr=False)
+
+    def start(self, before: Parts | None = None) -> None:
+        """Begin to work, in place of the parts before."""
+        if before is None or before.dispatcher is not self.dispatcher:
+            self.dispatcher.start()
+        self.watcher.start()
+
+    def stop(self, after: Parts | None = None) -> None:
+        """End all work; a dispatcher that the parts after go on with is left to them."""
+        self.watcher.stop()
+        self.decoder.close()
+        if after is None or after.dispatcher is not self.dispatcher:
+            self.dispatcher.stop()
+
+    def feed(self) -> None:
+        """Keep the decoder busy, with no more than it can take."""
+        while self.backlog.decoding < 2 * self.workers and (job := self.backlog.next()) is not None:
+            self.decoder.submit(Path(job.file.path)).add_done_callback(partial(self._decoded, job))
+
+    def _decoded(self, job: Job, future: Future[Segment]) -> None:
+        self.news.put(Decoded(self.backlog, job, future))
+
+
+def build(
+    config: Config, news: SimpleQueue[News], wake: threading.Event, workers: int, before: Parts | None = None
+) -> Parts:
+    """The parts of a configuration, not started. Raises ConfigError where a secret is missing.
+
+    With the channels of the parts before their dispatcher goes on: a message that is on its way when the
+    configuration is read again is then not sent a second time.
+    """
+    urls = {name: config.channel_url(name).get_secret_value() for name in config.channels}
+    if before is not None and before.urls == urls:
+        dispatcher = before.dispatcher
+    else:
+        state = Path(config.state.path)
+        channels = {name: Channel(name, url) for name, url in urls.items()}
+        dispatcher = Dispatcher(lambda: Outbox(state), channels, time.time, wake)
+    watcher = Watcher(
+        config.dockserver.roots,
+        {name: glider.paths for name, glider in config.gliders.items()},
+        config.dockserver.cache,
+        news,
+        config.dockserver.observer,
+    )
+    return Parts(
+        config,
+        news,
+        workers,
+        speaking(config),
+        Settling(config.dockserver.settle_seconds),
+        watcher,
+        Decoder(watcher.cache_folders(), max_workers=workers),
+        Backlog(),
+        dispatcher,
+        urls,
+    )

@@ -1,0 +1,339 @@
+"""What acceptance tests share: a dockserver of their own, the installed command, a mail server."""
+
+from __future__ import annotations
+
+import email
+import email.policy
+import hashlib
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from aiosmtpd.controller import Controller
+
+from gliderwatch.model import Assessment, Incident
+from gliderwatch.simulate.dockserver import deliver, write_cache
+from gliderwatch.simulate.glider import simulate
+from gliderwatch.simulate.scenario import Fault, FaultKind, Mission, Scenario
+from gliderwatch.store.sqlite import File, Status, Store
+
+GLIDERWATCH = Path(sys.executable).with_name("gliderwatch")
+PATIENCE = 60.0
+PASSWORD = "hunter2-do-not-tell"
+TRACEBACK = "Traceback"
+
+
+def until(condition: Callable[[], object], what: str, patience: float = PATIENCE) -> None:
+    """Wait until a condition holds; fail with `what` when it does not in time."""
+    deadline = time.monotonic() + patience
+    while not condition():
+        assert time.monotonic() < deadline, f"not within {patience:g} s: {what}"
+        time.sleep(0.02)
+
+
+def command(
+    *arguments: object, cwd: Path | None = None, timeout: float = 120.0, **env: str
+) -> subprocess.CompletedProcess[str]:
+    """Run the installed command and wait for its end."""
+    return subprocess.run(
+        [str(GLIDERWATCH), *map(str, arguments)],
+        cwd=cwd,
+        env=os.environ | env,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=timeout,
+    )
+
+
+def lines(path: Path) -> list[dict[str, Any]]:
+    """The objects of a file of JSON lines."""
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+
+
+# --------------------------------------------------------------------------- missions
+
+
+def remora(days: float = 3.0, *, onset: float = 1.5, seed: int = 4, glider: str = "bruce") -> Mission:
+    """A mission on which a remora takes hold of the glider: it has an incident."""
+    start = Scenario().start
+    fault = Fault(FaultKind.REMORA, start + onset * 86400, 8.0)
+    return simulate(Scenario(seed=seed, glider=glider, days=days, faults=(fault,)))
+
+
+def healthy(days: float = 1.0, *, seed: int = 11, glider: str = "angus") -> Mission:
+    """A mission without a fault."""
+    return simulate(Scenario(seed=seed, glider=glider, days=days))
+
+
+# --------------------------------------------------------------------------- mail
+
+
+@dataclass(frozen=True, slots=True)
+class Mail:
+    """A mail as the server took it; ``accepted`` by the monotonic clock (s)."""
+
+    id: str
+    subject: str
+    text: str
+    accepted: float
+
+
+@dataclass(slots=True)
+class Mailbox:
+    """The handler of a mail server: keeps what it accepts. While ``refusing``, it accepts nothing."""
+
+    mails: list[Mail] = field(default_factory=list)
+    port: int = 0
+    refusing: bool = False
+
+    @property
+    def url(self) -> str:
+        """The channel that leads here."""
+        return f"mailto://127.0.0.1:{self.port}?from=gliderwatch@dockserver.local&to=pilot@ship.local"
+
+    def times(self) -> Counter[str]:
+        """How often each Message-ID arrived."""
+        return Counter(mail.id for mail in self.mails)
+
+    async def handle_DATA(self, _server: Any, _session: Any, envelope: Any) -> str:  # noqa: N802 (aiosmtpd)
+        """Take one mail."""
+        if self.refusing:
+            return "451 come back later"
+        mail = email.message_from_bytes(envelope.content, policy=email.policy.default)
+        body = mail.get_body(("plain",))
+        text = "" if body is None else body.get_content()
+        self.mails.append(Mail(mail["Message-ID"], mail["Subject"], text, time.monotonic()))
+        return "250 accepted"
+
+
+@contextmanager
+def mail_server(box: Mailbox | None = None) -> Iterator[Mailbox]:
+    """A mail server on a port of its own."""
+    box = box if box is not None else Mailbox()
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        box.port = probe.getsockname()[1]
+    server = Controller(box, hostname="127.0.0.1", port=box.port)
+    server.start()
+    try:
+        yield box
+    finally:
+        server.stop()
+
+
+# --------------------------------------------------------------------------- dockserver
+
+
+class Site:
+    """A dockserver, a configuration and a state file, below one folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.root, self.cache = folder / "gliders", folder / "cache"
+        self.state, self.config = folder / "state" / "state.sqlite", folder / "gliderwatch.yml"
+        self.root.mkdir(parents=True)
+        self.cache.mkdir()
+
+    def configure(
+        self,
+        *gliders: str,
+        url: str | None = None,
+        surfacing: Sequence[str] = (),
+        defaults: Mapping[str, Any] | None = None,
+        **dockserver: object,
+    ) -> Path:
+        """Write the configuration (JSON is YAML); files of short names settle in a second."""
+        places = {"roots": [str(self.root)], "cache": [str(self.cache)], "settle_seconds": 1}
+        document: dict[str, Any] = {
+            "dockserver": places | dockserver,
+            "state": {"path": str(self.state)},
+            "defaults": defaults or {"normal_speed": {"min": 0.2, "max": 0.4}},
+            "gliders": dict.fromkeys(gliders),
+        }
+        if url is not None:
+            document["channels"] = {"mail": {"url": url}}
+            document["recipients"] = {"pilot": {"channels": ["mail"], "surfacing": list(surfacing)}}
+        self.config.write_text(json.dumps(document, indent=1), encoding="utf-8")
+        return self.config
+
+    def folder(self, glider: str) -> Path:
+        """The from-glider folder of a glider, made if need be."""
+        folder = self.root / glider / "from-glider"
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder
+
+    def caches(self, *missions: Mission) -> None:
+        """Put the cache files of missions where they belong."""
+        for mission in missions:
+            write_cache(self.cache, mission)
+
+    def put(self, glider: str, name: str, data: bytes) -> Path:
+        """Let a file arrive as a dockserver does."""
+        path = self.folder(glider) / name
+        deliver(path, data)
+        return path
+
+    def files(self) -> dict[str, File]:
+        """The ledger by the names of files; empty before there is one."""
+        if not self.state.exists():
+            return {}
+        store = Store.reading(self.state)
+        try:
+            return {Path(file.path).name: file for file in store.files(*Status)}
+        finally:
+            store.close()
+
+    def statuses(self, *names: str) -> list[Status | None]:
+        """What became of files by name; None of one not seen yet."""
+        ledger = self.files()
+        return [ledger[name].status if name in ledger else None for name in names]
+
+    def undelivered(self) -> int:
+        """How many messages wait in the outbox."""
+        store = Store.reading(self.state)
+        try:
+            return len(store.undelivered())
+        finally:
+            store.close()
+
+    def tree(self) -> dict[str, tuple[int, str]]:
+        """Everything below the root: time of change, and content or what it is instead."""
+        return {str(p.relative_to(self.root)): _print(p) for p in sorted(self.root.rglob("*"))}
+
+    def status(self) -> dict[str, Any]:
+        """What `status --json` tells."""
+        result = command("status", "-c", self.config, "--json")
+        assert result.stdout, result.stderr
+        told: dict[str, Any] = json.loads(result.stdout)
+        return told
+
+
+def _print(path: Path) -> tuple[int, str]:
+    state = path.lstat()
+    content = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else f"mode {state.st_mode:o}"
+    return state.st_mtime_ns, content
+
+
+def results(state: Path) -> dict[str, tuple[list[Assessment], list[Incident]]]:
+    """Assessments and incidents of each glider in a state file."""
+    store = Store.reading(state)
+    try:
+        return {glider: (store.assessments(glider), store.incidents(glider)) for glider in store.gliders()}
+    finally:
+        store.close()
+
+
+# --------------------------------------------------------------------------- daemon
+
+
+class Daemon:
+    """The service as a process. Its log goes to a file, which lives on from start to start."""
+
+    def __init__(self, site: Site, program: Sequence[object] = (GLIDERWATCH,), **env: str) -> None:
+        self.site, self.program, self.env = site, [str(part) for part in program], env
+        self.log_path = site.config.with_name("daemon.log")
+        self.scratch = site.config.with_name("scratch")
+        self.scratch.mkdir(exist_ok=True)
+        self.process: subprocess.Popen[bytes] | None = None
+
+    def __enter__(self) -> Daemon:
+        return self.start().ready()
+
+    def __exit__(self, *_: object) -> None:
+        if self.process is not None:
+            self.process.kill()
+            self.process.wait()
+
+    def start(self) -> Daemon:
+        """Start it; `ready` waits until it watches."""
+        with self.log_path.open("ab") as log:
+            self.process = subprocess.Popen(
+                [*self.program, "run", "-c", self.site.config],
+                env=os.environ | self.env,
+                stderr=log,
+                stdout=log,
+            )
+        return self
+
+    @property
+    def pid(self) -> int:
+        """Its process id."""
+        assert self.process is not None
+        return self.process.pid
+
+    def ready(self) -> Daemon:
+        """Wait until it watches."""
+
+        def watches() -> bool:
+            assert self.alive(), f"it ended: {self.text()}"
+            return f'"pid": {self.pid},' in self.text()
+
+        until(watches, "watching")
+        return self
+
+    def text(self) -> str:
+        """All that it ever said."""
+        return self.log_path.read_text(encoding="utf-8") if self.log_path.exists() else ""
+
+    def log(self, event: str) -> list[dict[str, Any]]:
+        """Lines of its log with an event, a pattern."""
+        whole = self.text().rpartition("\n")[0].splitlines()
+        entries = (json.loads(line) for line in whole if line.startswith("{"))
+        return [entry for entry in entries if re.fullmatch(event, entry["event"])]
+
+    def kill(self) -> None:
+        """End it as a power cut would."""
+        assert self.process is not None
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait()
+
+    def stop(self, patience: float = PATIENCE) -> int:
+        """End it by SIGTERM; its exit code."""
+        assert self.process is not None
+        self.process.send_signal(signal.SIGTERM)
+        return self.process.wait(patience)
+
+    def reload(self) -> None:
+        """Send SIGHUP."""
+        assert self.process is not None
+        self.process.send_signal(signal.SIGHUP)
+
+    def alive(self) -> bool:
+        """Whether the process runs."""
+        return self.process is not None and self.process.poll() is None
+
+    def wait(self, patience: float = PATIENCE) -> int:
+        """Wait for its end; its exit code."""
+        assert self.process is not None
+        return self.process.wait(patience)
+
+
+@contextmanager
+def notify_socket(folder: Path) -> Iterator[tuple[str, list[str]]]:
+    """A socket as the service manager has one: its address, and the lines that come in."""
+    address, told = str(folder / "notify"), []
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
+        sock.bind(address)
+        thread = threading.Thread(target=_listen, args=(sock, told), daemon=True)
+        thread.start()
+        yield address, told
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end:
+            end.sendto(b"", address)
+        thread.join(PATIENCE)
+
+
+def _listen(sock: socket.socket, told: list[str]) -> None:
+    while data := sock.recv(4096):
+        told += data.decode().splitlines()
