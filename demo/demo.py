@@ -7,6 +7,7 @@ the mail goes through an SMTP server on this machine. Run by `make demo`; leaves
 from __future__ import annotations
 
 import email.policy
+import json
 import os
 import signal
 import socket
@@ -23,24 +24,21 @@ from rich.console import Console
 from rich.panel import Panel
 from rich.text import Text
 
-from gliderwatch.simulate.dockserver import Arrival, arrivals, deliver, from_glider, write_cache
-from gliderwatch.simulate.glider import simulate
-from gliderwatch.simulate.scenario import Fault, FaultKind, Mission, Scenario
-
-DAYS, ONSET = 3.0, 2.0
-PACE = 0.2
-"""Seconds between two files: three and a half hours of a glider's life."""
+HURT, WELL = "sim-01", "sim-02"
+SPEEDUP = 12000
+"""Three days of the gliders' lives in about twenty seconds."""
+FLEET = ("--gliders", "2", "--days", "3", "--fault", "remora:8@2", "--seed", "4")
 PATIENCE = 30.0
 GLIDERWATCH = Path(sys.executable).with_name("gliderwatch")
 
 CONFIGURATION = """\
 dockserver:
-  roots: [{folder}/gliders]
-  cache: [{folder}/cache]
+  roots: [{folder}/dockserver/gliders]
+  cache: [{folder}/dockserver/cache]
 state: {{path: {folder}/state.sqlite}}
 defaults:
   normal_speed: {{min: 0.20, max: 0.40}}
-gliders: {{angus: , bruce: }}
+gliders: {{sim-01: , sim-02: }}
 channels:
   mail: {{url: "mailto://127.0.0.1:{port}?from=gliderwatch@dockserver.local&to=pilot@ship.local"}}
 recipients:
@@ -74,26 +72,33 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def fleet() -> list[Mission]:
-    """Two gliders; a remora takes hold of one of them after two days."""
-    healthy = Scenario(seed=11, glider="angus", days=DAYS)
-    remora = Fault(FaultKind.REMORA, healthy.start + ONSET * 86400, 8.0)
-    slowed = Scenario(seed=4, glider="bruce", days=DAYS, faults=(remora,))
-    return [simulate(healthy), simulate(slowed)]
-
-
-def play(missions: list[Mission], root: Path, console: Console) -> None:
-    """Let the files of all gliders arrive in the order of time."""
-    files: list[tuple[Arrival, Mission]] = [(a, m) for m in missions for a in arrivals(m)]
+def play(dockserver: Path, console: Console) -> None:
+    """Let a simulated fleet send its files as time passes, and show them as they come."""
+    command = [GLIDERWATCH, "simulate", dockserver, *FLEET, "--live", "--speedup", str(SPEEDUP)]
+    fleet = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    seen: set[Path] = set()
     told = False
-    for arrival, mission in sorted(files, key=lambda f: f[0].time):
-        if not told and arrival.time >= mission.scenario.start + ONSET * 86400:
-            console.print("[bold yellow]        a remora takes hold of bruce[/]")
-            told = True
-        when = time.strftime("%d %b %H:%M", time.gmtime(arrival.time))
-        console.print(f"{when}  {mission.scenario.glider} surfaced: {arrival.name}", highlight=False)
-        deliver(from_glider(root, mission) / arrival.name, arrival.data)
-        time.sleep(PACE)
+    try:
+        while fleet.poll() is None:
+            time.sleep(0.1)
+            for path in sorted(set(dockserver.glob("gliders/*/from-glider/*.sbd")) - seen):
+                seen.add(path)
+                when = path.stat().st_mtime
+                if not told and when > onset(dockserver):
+                    console.print(f"[bold yellow]              a remora has taken hold of {HURT}[/]")
+                    told = True
+                day = time.strftime("%d %b %H:%M", time.gmtime(when))
+                console.print(f"{day}  {path.parts[-3]} sent {path.name}", highlight=False)
+    finally:
+        fleet.terminate()
+        if fleet.wait() not in (0, -signal.SIGTERM):
+            sys.exit("the simulation failed: try it with `gliderwatch simulate`")
+
+
+def onset(dockserver: Path) -> float:
+    """When the remora comes (s), as the truth beside the files tells."""
+    truth = json.loads((dockserver / "truth.json").read_text(encoding="utf-8"))
+    return float(truth["gliders"][0]["faults"][0]["onset_seconds"])
 
 
 def wait_for_status(config: Path) -> None:
@@ -116,10 +121,8 @@ def main() -> int:
         folder = Path(name)
         config = folder / "gliderwatch.yml"
         config.write_text(CONFIGURATION.format(folder=folder, port=port))
-        missions = fleet()
-        for mission in missions:
-            write_cache(folder / "cache", mission)
-            from_glider(folder / "gliders", mission).mkdir(parents=True)
+        for part in ("gliders", "cache"):
+            (folder / "dockserver" / part).mkdir(parents=True)
         console.rule("a dockserver, two gliders, one daemon")
         subprocess.run([GLIDERWATCH, "check", "-c", config], check=True)
         with (folder / "daemon.log").open("wb") as log:
@@ -127,7 +130,7 @@ def main() -> int:
             daemon = subprocess.Popen([GLIDERWATCH, "run", "-c", config], stderr=log, env=environment)
         try:
             wait_for_status(config)
-            play(missions, folder / "gliders", console)
+            play(folder / "dockserver", console)
             deadline = time.monotonic() + PATIENCE
             while not mailbox.mails and time.monotonic() < deadline:
                 time.sleep(0.1)
@@ -137,9 +140,9 @@ def main() -> int:
             daemon.send_signal(signal.SIGTERM)
             daemon.wait(10)
             server.stop()
-    arrived = [m["Subject"] for m in mailbox.mails if "bruce" in m["Subject"]]
-    false = [m["Subject"] for m in mailbox.mails if "angus" in m["Subject"]]
-    console.rule(f"{len(arrived)} mails about bruce, {len(false)} about angus, who is well")
+    arrived = [m["Subject"] for m in mailbox.mails if HURT in m["Subject"]]
+    false = [m["Subject"] for m in mailbox.mails if WELL in m["Subject"]]
+    console.rule(f"{len(arrived)} mails about {HURT}, {len(false)} about {WELL}, which is well")
     return 0 if arrived and not false else 1
 
 

@@ -8,61 +8,155 @@ segments. Everything happens on the grid of the glider's cycle (4 s) since the s
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from gliderwatch.simulate.dinkum import Header
 from gliderwatch.simulate.dive import dive
-from gliderwatch.simulate.ocean import make_ocean
-from gliderwatch.simulate.scenario import Mission, Scenario
+from gliderwatch.simulate.ocean import Ocean, make_ocean
+from gliderwatch.simulate.onboard import displacement
+from gliderwatch.simulate.scenario import DiveTruth, Mission, Scenario
+from gliderwatch.simulate.sensors import SCIENCE_SENSORS, SCIENCE_TIME, SENSORS, TIME, sensor_list
 from gliderwatch.simulate.surfacing import surface
-from gliderwatch.simulate.telemetry import SENSORS, Log, SegmentData, sensor_list
+from gliderwatch.simulate.telemetry import CYCLE, SCIENCE_CYCLE, Log, SegmentData, Selection, everything
 from gliderwatch.simulate.vehicle import Glider
 
 _SENDING = (60.0, 240.0)
+_SCIENCE_LEAD = 5.0
+"""The science computer opens its file so much before (s)."""
+_PER_CYCLE = round(CYCLE / SCIENCE_CYCLE)
 
 
 def simulate(scenario: Scenario) -> Mission:
     """Simulate a mission until the first surfacing after its ``days``; the last segment is at the surface.
 
     Raises:
-        ValueError: the scenario has a sensor that is not simulated, or no steady glide.
+        ValueError: no steady glide.
     """
-    seas, flight = np.random.default_rng(scenario.seed).spawn(2)
-    end = scenario.start + 86400 * scenario.days
-    ocean = make_ocean(scenario.sea, scenario.start, end + 86400 + 2 * scenario.interval, seas)
-    log = Log(scenario.start, dict.fromkeys((sensor.name for sensor in SENSORS), 0.0))
-    glider = Glider(scenario, ocean, flight, log, scenario.place, scenario.place)
-    segments: list[SegmentData] = []
-    truth = []
-    _, opened = surface(glider, None)
-    while glider.time(glider.cycle) < end:
-        flown = dive(glider, _name(scenario, len(segments)))
-        closed, reopened = surface(glider, flown)
-        segments.append(_segment(glider, len(segments), opened, closed))
-        truth.append(flown.truth)
-        opened = reopened
-    segments.append(_segment(glider, len(segments), opened, glider.cycle))
-    return Mission(scenario, tuple(segments), tuple(truth))
+    glider = _launch(scenario)
+    files, truth = _Files(glider), []
+    plan, _ = surface(glider, None)
+    name, opened = files.next_name(), plan.opened
+    while glider.time(glider.cycle) < scenario.start + 86400 * scenario.days:
+        flown = dive(glider, name[1])
+        plan, seen = surface(glider, flown)
+        assert seen is not None
+        truth.append(seen)
+        files.close(name, opened, plan.closed)
+        files.send(float(glider.rng.uniform(*_SENDING)))
+        if plan.restart:
+            files.restart(glider.time(plan.opened))
+        if plan.own_file:
+            files.close(files.next_name(), *plan.own_file)
+        name, opened = files.next_name(), plan.opened
+    files.close(name, opened, glider.cycle)
+    files.send(float(glider.rng.uniform(*_SENDING)))
+    return files.mission(tuple(truth))
 
 
-def _name(scenario: Scenario, number: int) -> str:
-    """Full name of a segment: glider, year, day of the year counted from 0, mission, segment."""
-    day = time.gmtime(scenario.start)
-    return f"{scenario.glider}-{day.tm_year}-{day.tm_yday - 1}-0-{number}"
+def _launch(scenario: Scenario) -> Glider:
+    """The glider at its place at the start of the mission."""
+    logs = [
+        Log(
+            scenario.start,
+            dict.fromkeys((sensor.name for sensor in sensors), 0.0),
+            step,
+            clock,
+            scenario.rates.clock_skew,
+        )
+        for sensors, step, clock in (
+            (SENSORS, CYCLE, TIME),
+            (SCIENCE_SENSORS, SCIENCE_CYCLE, SCIENCE_TIME),
+        )
+    ]
+    place, origin = scenario.place, scenario.origin or scenario.place
+    east, north = displacement(origin, place)
+    ocean, chance = _sea(scenario), (scenario.rng(1), scenario.rng(2))
+    return Glider(scenario, ocean, *chance, logs[0], logs[1], place, place, place, east, north)
 
 
-def _segment(glider: Glider, number: int, opened: int, closed: int) -> SegmentData:
-    """The segment between two cycles, and when it has reached shore."""
-    scenario = glider.scenario
-    sensors = sensor_list(scenario.cadence)
-    values, updated = glider.log.cut(opened, closed, sensors, scenario.cadence)
-    header = Header(
-        short_name=f"{scenario.mission_number:04d}{number:04d}",
-        full_name=_name(scenario, number),
-        extension="sbd",
-        mission=scenario.mission,
-        opened=glider.time(opened),
-    )
-    end = glider.time(closed)
-    return SegmentData(header, sensors, values, updated, end, end + float(glider.rng.uniform(*_SENDING)))
+def _sea(scenario: Scenario) -> Ocean:
+    """The sea of the scenario, the same for all gliders of a fleet."""
+    rng = np.random.default_rng(np.random.SeedSequence(scenario.seed, spawn_key=(0,)))
+    end = scenario.start + 86400 * (scenario.days + 1) + 2 * scenario.interval
+    lat = (scenario.origin or scenario.place).lat
+    return make_ocean(scenario.sea, scenario.start, end, rng, lat=lat)
+
+
+_Name = tuple[str, str]
+
+
+@dataclass(slots=True)
+class _Files:
+    """The files of a mission as the glider makes them, named in the two ways of Slocums."""
+
+    glider: Glider
+    missions: int = 0
+    count: int = 0
+    day: str = ""
+    kinds: tuple[list[SegmentData], ...] = field(default_factory=lambda: ([], [], []))
+    unsent: list[tuple[int, SegmentData]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._begin(self.glider.scenario.start)
+
+    def _begin(self, t: float) -> None:
+        day = time.gmtime(t + self.glider.scenario.rates.clock_skew)
+        self.day = f"{day.tm_year}-{day.tm_yday - 1}"
+
+    def restart(self, t: float) -> None:
+        """A new mission begins at ``t`` (s)."""
+        self.missions, self.count = self.missions + 1, 0
+        self._begin(t)
+
+    def next_name(self) -> _Name:
+        """The 8.3 and the full name of the next segment: missions and days are counted from 0."""
+        scenario, number = self.glider.scenario, self.count
+        self.count += 1
+        short = f"{scenario.mission_number + self.missions:04d}{number:04d}"
+        return short, f"{scenario.glider}-{self.day}-{self.missions}-{number}"
+
+    def close(self, name: _Name, first: int, last: int) -> None:
+        """Close the files of the segment between two cycles."""
+        scenario, glider = self.glider.scenario, self.glider
+        flight = [Selection(sensor_list(scenario.cadence), scenario.cadence, scenario.nth_yo)]
+        science = [Selection(sensor_list(scenario.science, science=True), scenario.science, scenario.nth_yo)]
+        if scenario.full_rate:
+            flight.append(everything(SENSORS, CYCLE))
+            science.append(everything(SCIENCE_SENSORS, SCIENCE_CYCLE))
+        kinds = [("sbd", 0), ("dbd", 2)]
+        self._close(glider.log, name, (first, last), flight, kinds)
+        if scenario.science or scenario.full_rate:
+            both = (_PER_CYCLE * first, _PER_CYCLE * last)
+            self._close(glider.science, name, both, science, [("tbd", 1), ("ebd", 2)])
+
+    def _close(
+        self,
+        log: Log,
+        name: _Name,
+        cycles: tuple[int, int],
+        selections: list[Selection],
+        kinds: list[tuple[str, int]],
+    ) -> None:
+        lead = _SCIENCE_LEAD if log.time == SCIENCE_TIME else 0.0
+        end = log.start + log.step * cycles[1]
+        tables = log.cut(*cycles, selections)
+        for (extension, kind), selection, (values, updated) in zip(kinds, selections, tables, strict=False):
+            opened = float(log.clock(cycles[0])) - lead
+            header = Header(*name, extension, self.glider.scenario.mission, opened)
+            segment = SegmentData(header, selection.sensors, values, updated, end, end)
+            self.unsent.append((kind, segment))
+
+    def send(self, delay: float) -> None:
+        """Send what is closed and not sent yet, ``delay`` s after the last of it was closed."""
+        time_sent = max(segment.closed for _, segment in self.unsent) + delay
+        for kind, segment in self.unsent:
+            self.kinds[kind].append(segment.sent_at(time_sent))
+        self.unsent.clear()
+
+    def mission(self, truth: tuple[DiveTruth, ...]) -> Mission:
+        """All of it; science files only where they were asked for."""
+        segments, science, full_rate = (tuple(kind) for kind in self.kinds)
+        wanted = science if self.glider.scenario.science else ()
+        return Mission(self.glider.scenario, segments, truth, wanted, full_rate)

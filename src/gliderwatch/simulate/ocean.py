@@ -1,48 +1,107 @@
-"""A current with known truth: residual, slow weather, tidal ellipses. Pure: seed in, numbers out.
-
-The current is uniform with depth, so that it is itself the depth average that a glider estimates.
-"""
+"""A current with known truth: slow weather, tides, inertial motion, a front. Pure: seed in, numbers out."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
+from math import pi, radians, sin
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gliderwatch.model import Array, readonly
 
-M2_PERIOD = 12.4206012 * 3600
-K1_PERIOD = 23.9344696 * 3600
 _MODES = 6
 _STEP = 1800.0
+_EARTH = 7.292115e-5
+"""Angular frequency of the earth's rotation (rad/s)."""
+_INERTIAL_MEMORY = 3 * 86400.0
+
+
+class Constituent(StrEnum):
+    """A tidal constituent."""
+
+    M2 = "M2"
+    S2 = "S2"
+    N2 = "N2"
+    K1 = "K1"
+    O1 = "O1"
+
+    @property
+    def frequency(self) -> float:
+        """Angular frequency (rad/s)."""
+        return radians(_DEGREES_AN_HOUR[self]) / 3600
+
+
+_DEGREES_AN_HOUR = {
+    Constituent.M2: 28.9841042,
+    Constituent.S2: 30.0,
+    Constituent.N2: 28.4397295,
+    Constituent.K1: 15.0410686,
+    Constituent.O1: 13.9430356,
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Ellipse:
-    """One tidal constituent.
+    """The ellipse of one tidal constituent.
 
-    ``period`` (s), ``major`` and ``minor`` axis (m/s; a positive minor axis turns counter-clockwise),
+    ``major`` and ``minor`` axis (m/s; a positive minor axis turns counter-clockwise),
     ``inclination`` of the major axis (rad, counter-clockwise from east), ``phase`` (rad at t = 0).
     """
 
-    period: float
+    constituent: Constituent
     major: float
-    minor: float
-    inclination: float
-    phase: float
+    minor: float = 0.0
+    inclination: float = 0.0
+    phase: float = 0.0
 
     def current(self, t: Array) -> tuple[Array, Array]:
         """Eastward and northward current (m/s) at times ``t`` (s)."""
-        angle = 2 * np.pi * t / self.period - self.phase
+        angle = self.constituent.frequency * t - self.phase
         along, across = self.major * np.cos(angle), self.minor * np.sin(angle)
         c, s = np.cos(self.inclination), np.sin(self.inclination)
         return along * c - across * s, along * s + across * c
 
 
 TIDES = (
-    Ellipse(M2_PERIOD, major=0.06, minor=0.02, inclination=0.6, phase=0.4),
-    Ellipse(K1_PERIOD, major=0.03, minor=-0.01, inclination=1.2, phase=2.0),
+    Ellipse(Constituent.M2, major=0.06, minor=0.02, inclination=0.6, phase=0.4),
+    Ellipse(Constituent.K1, major=0.03, minor=-0.01, inclination=1.2, phase=2.0),
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Front:
+    """A jet along a front that meanders.
+
+    ``speed`` (m/s) in its middle, ``width`` (m) to where it has fallen to 0.42 of that, ``direction``
+    (rad, counter-clockwise from east) that it flows to, ``distance`` (m) of its middle to the left
+    of the origin, seen along the flow. Meanders have an ``amplitude`` (m), a ``wavelength`` (m) and
+    move along at ``phase_speed`` (m/s).
+    """
+
+    speed: float
+    width: float = 25e3
+    direction: float = 0.8
+    distance: float = 20e3
+    amplitude: float = 8e3
+    wavelength: float = 200e3
+    phase_speed: float = 0.1
+
+    def __post_init__(self) -> None:
+        if min(self.width, self.wavelength) <= 0:
+            raise ValueError("a front has a width and a wavelength above 0 m")
+
+    def current(self, t: Array, east: Array, north: Array) -> tuple[Array, Array]:
+        """Eastward and northward current (m/s) at times (s) and places (m from the origin)."""
+        c, s = np.cos(self.direction), np.sin(self.direction)
+        along, left = east * c + north * s, north * c - east * s
+        k = 2 * pi / self.wavelength
+        angle = k * (along - self.phase_speed * t)
+        middle = self.distance + self.amplitude * np.sin(angle)
+        slope = np.arctan(self.amplitude * k * np.cos(angle))
+        speed = self.speed / np.cosh((left - middle) / self.width) ** 2
+        return speed * np.cos(self.direction + slope), speed * np.sin(self.direction + slope)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +109,10 @@ class Sea:
     """What kind of sea it is.
 
     ``residual`` is the mean current (m/s; east, north). ``sigma`` (m/s, a component), ``tau`` (s) and
-    ``scale`` (m) are strength, memory and size of the slow Ornstein-Uhlenbeck part.
+    ``scale`` (m) are strength, memory and size of the slow Ornstein-Uhlenbeck part. ``shear`` is the
+    part (0 to 1) of all this, and of the front, that is gone far below ``shear_depth`` (m); tides reach
+    the bottom. ``inertial`` (m/s) is the usual strength of near-inertial motion at the surface, which
+    falls off over ``inertial_depth`` (m) and turns with depth.
     """
 
     residual: tuple[float, float] = (0.05, 0.02)
@@ -58,6 +120,17 @@ class Sea:
     tau: float = 30 * 3600.0
     scale: float = 40e3
     tides: tuple[Ellipse, ...] = TIDES
+    shear: float = 0.0
+    shear_depth: float = 50.0
+    inertial: float = 0.0
+    inertial_depth: float = 40.0
+    front: Front | None = None
+
+    def __post_init__(self) -> None:
+        if min(self.tau, self.scale, self.shear_depth, self.inertial_depth) <= 0:
+            raise ValueError("tau, scale, shear_depth and inertial_depth are above 0")
+        if not (0 <= self.shear <= 1 and self.sigma >= 0 and self.inertial >= 0):
+            raise ValueError("shear is a part, 0 to 1; sigma and inertial are not negative")
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,52 +138,90 @@ class Ocean:
     """One realisation of a sea between ``nodes[0]`` and ``nodes[-1]`` (s).
 
     ``wave_numbers`` (rad/m, shape (modes, 2)) and ``amplitudes`` (m/s, shape (4 modes, nodes)) make
-    the slow part: a sum of plane waves whose amplitudes wander.
+    the slow part: a sum of plane waves whose amplitudes wander. ``envelope`` (m/s, complex, shape
+    (nodes,)) is that of the near-inertial motion, of frequency ``coriolis`` (rad/s).
     """
 
     sea: Sea
     nodes: Array
     wave_numbers: Array
     amplitudes: Array
+    envelope: NDArray[np.complex128]
+    coriolis: float
 
-    def current(self, t: Array, east: Array, north: Array) -> tuple[Array, Array]:
+    def current(self, t: Array, east: Array, north: Array, depth: Array | float = 0.0) -> tuple[Array, Array]:
         """Eastward and northward current (m/s).
 
         Args:
             t: Times (s), shape (n,).
             east: Metres east of the origin of the mission, shape (n,).
             north: Metres north of it, shape (n,).
+            depth: Depths (m), shape (n,) or one for all.
 
         Raises:
             ValueError: a time outside the span that was made.
         """
         if t.min() < self.nodes[0] or t.max() > self.nodes[-1]:
             raise ValueError("time outside the ocean's span: make the ocean for a longer mission")
+        u, v = self._slow(t, east, north)
+        if self.sea.front:
+            front_u, front_v = self.sea.front.current(t, east, north)
+            u, v = u + front_u, v + front_v
+        if self.sea.shear:
+            left = 1 - self.sea.shear * (1 - np.exp(-np.asarray(depth) / self.sea.shear_depth))
+            u, v = u * left, v * left
+        for ellipse in self.sea.tides:
+            tide_u, tide_v = ellipse.current(t)
+            u, v = u + tide_u, v + tide_v
+        if self.sea.inertial:
+            turning = self._inertial(t, depth)
+            u, v = u + turning.real, v + turning.imag
+        return u, v
+
+    def _slow(self, t: Array, east: Array, north: Array) -> tuple[Array, Array]:
         u, v = np.full(t.shape, self.sea.residual[0]), np.full(t.shape, self.sea.residual[1])
         for j, (k_east, k_north) in enumerate(self.wave_numbers):
             angle = k_east * east + k_north * north
             a, b, c, d = (np.interp(t, self.nodes, row) for row in self.amplitudes[4 * j : 4 * j + 4])
             u += a * np.cos(angle) + b * np.sin(angle)
             v += c * np.cos(angle) + d * np.sin(angle)
-        for ellipse in self.sea.tides:
-            tide_u, tide_v = ellipse.current(t)
-            u, v = u + tide_u, v + tide_v
         return u, v
 
+    def _inertial(self, t: Array, depth: Array | float) -> NDArray[np.complex128]:
+        """Near-inertial current (m/s), east + i north: clockwise in the northern hemisphere."""
+        downward = np.asarray(depth) / self.sea.inertial_depth
+        envelope = np.interp(t, self.nodes, self.envelope)
+        turned: NDArray[np.complex128] = envelope * np.exp(-1j * (self.coriolis * t + downward) - downward)
+        return turned
 
-def make_ocean(sea: Sea, start: float, end: float, rng: np.random.Generator) -> Ocean:
-    """A realisation of ``sea`` for times from ``start`` to ``end`` (s).
+
+def make_ocean(sea: Sea, start: float, end: float, rng: np.random.Generator, *, lat: float = 30.0) -> Ocean:
+    """A realisation of ``sea`` about latitude ``lat`` (degrees) for times from ``start`` to ``end`` (s).
 
     The wandering amplitudes are exact samples of an Ornstein-Uhlenbeck process every half hour; wave
     numbers are drawn so that the covariance in space is sigma^2 exp(-d^2 / (2 scale^2)) on average
     over seeds (Rahimi and Recht 2007, random Fourier features).
     """
     nodes = np.arange(start, end + _STEP, _STEP)
-    decay = np.exp(-_STEP / sea.tau)
-    kicks = rng.standard_normal((len(nodes), 4 * _MODES))
-    kicks[1:] *= np.sqrt(1 - decay**2)
-    for i in range(1, len(nodes)):
-        kicks[i] += decay * kicks[i - 1]
-    amplitudes = sea.sigma / np.sqrt(_MODES) * kicks.T
+    amplitudes = sea.sigma / np.sqrt(_MODES) * _wandering(len(nodes), 4 * _MODES, sea.tau, rng).T
     wave_numbers = rng.standard_normal((_MODES, 2)) / sea.scale
-    return Ocean(sea, readonly(nodes), readonly(wave_numbers), readonly(amplitudes))
+    envelope = _wandering(len(nodes), 2, _INERTIAL_MEMORY, rng) @ np.array([1.0, 1.0j])
+    coriolis = 2 * _EARTH * sin(radians(lat))
+    return Ocean(
+        sea,
+        readonly(nodes),
+        readonly(wave_numbers),
+        readonly(amplitudes),
+        sea.inertial / np.sqrt(2) * envelope,
+        coriolis,
+    )
+
+
+def _wandering(n: int, columns: int, memory: float, rng: np.random.Generator) -> Array:
+    """Ornstein-Uhlenbeck processes of variance 1 at the nodes, shape (n, columns)."""
+    decay = np.exp(-_STEP / memory)
+    kicks = rng.standard_normal((n, columns))
+    kicks[1:] *= np.sqrt(1 - decay**2)
+    for i in range(1, n):
+        kicks[i] += decay * kicks[i - 1]
+    return kicks

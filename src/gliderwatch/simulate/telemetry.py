@@ -1,82 +1,27 @@
-"""What of a glider's log goes into a real-time file. Pure but for the log it keeps.
+"""What of a glider's log goes into a file. Pure but for the log it keeps.
 
 On board every sensor is updated when it is measured; a real-time file takes each sensor at its own
-cadence, and has a line only where some sensor is due.
+cadence, some only on every n-th yo, and has a line only where some sensor is due.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gliderwatch.model import Array
 from gliderwatch.simulate.dinkum import Header, Sensor, SensorList
+from gliderwatch.simulate.sensors import CADENCE, SCIENCE_SECONDS, SECONDS
+
+__all__ = ["CADENCE", "CYCLE", "SCIENCE_CYCLE", "Log", "SegmentData", "Selection", "everything"]
 
 CYCLE = 4.0
-TIME = "m_present_time"
-
-_UNITS = {
-    "c_ballast_pumped": "cc",
-    "c_heading": "rad",
-    "c_wpt_lat": "lat",
-    "c_wpt_lon": "lon",
-    "m_ballast_pumped": "cc",
-    "m_battery": "volts",
-    "m_coulomb_amphr_total": "amp-hrs",
-    "m_depth": "m",
-    "m_depth_rate": "m/s",
-    "m_final_water_vx": "m/s",
-    "m_final_water_vy": "m/s",
-    "m_gps_lat": "lat",
-    "m_gps_lon": "lon",
-    "m_gps_mag_var": "rad",
-    "m_gps_status": "enum",
-    "m_heading": "rad",
-    "m_initial_water_vx": "m/s",
-    "m_initial_water_vy": "m/s",
-    "m_lat": "lat",
-    "m_leakdetect_voltage": "volts",
-    "m_lon": "lon",
-    "m_pitch": "rad",
-    TIME: "timestamp",
-    "m_roll": "rad",
-    "m_speed": "m/s",
-    "m_vacuum": "inHg",
-    "m_water_vx": "m/s",
-    "m_water_vy": "m/s",
-}
-_SIZES = {"lat": 8, "lon": 8, "timestamp": 8, "enum": 1}
-
-SENSORS = tuple(Sensor(name, unit, _SIZES.get(unit, 4)) for name, unit in _UNITS.items())
-
-CADENCE: Mapping[str, float] = {
-    "c_heading": 600,
-    "c_wpt_lat": 600,
-    "c_wpt_lon": 600,
-    "m_ballast_pumped": 600,
-    "m_battery": 1800,
-    "m_coulomb_amphr_total": 1800,
-    "m_depth": 32,
-    "m_final_water_vx": 4,
-    "m_final_water_vy": 4,
-    "m_gps_lat": 4,
-    "m_gps_lon": 4,
-    "m_gps_mag_var": 30,
-    "m_gps_status": 30,
-    "m_heading": 64,
-    "m_lat": 600,
-    "m_leakdetect_voltage": 1800,
-    "m_lon": 600,
-    "m_pitch": 64,
-    "m_roll": 128,
-    "m_vacuum": 1800,
-    "m_water_vx": 4,
-    "m_water_vy": 4,
-}
-"""Which sensors a coastal glider sends, and how often at most (s)."""
+"""Seconds between two cycles of the flight computer."""
+SCIENCE_CYCLE = 2.0
+"""Seconds between two cycles of the science computer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,8 +29,8 @@ class SegmentData:
     """One segment as it goes into a file.
 
     ``values`` and ``updated`` have shape (cycles, sensors sent); the first row is the state of the
-    glider just before the segment. ``closed`` is when the glider ended it, ``sent`` when it has
-    reached shore (s).
+    glider just before the segment. ``closed`` is when the glider ended it, ``sent`` when it may
+    be on shore at the earliest (s, true time).
     """
 
     header: Header
@@ -95,30 +40,49 @@ class SegmentData:
     closed: float
     sent: float
 
+    def sent_at(self, time: float) -> SegmentData:
+        """The same segment, sent at another time (s)."""
+        return replace(self, sent=time)
 
-def sensor_list(cadence: Mapping[str, float]) -> SensorList:
-    """The list of sensors of files that hold those in ``cadence``, and time.
 
-    Raises:
-        ValueError: a sensor that is not simulated, or a cadence shorter than a cycle.
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """What a kind of file takes of a log.
+
+    ``cadence`` is the least time (s) between two values of a sensor, at least a cycle; ``nth_yo`` says of
+    some that they are sent on every n-th yo of a dive only.
     """
-    for name, period in cadence.items():
-        if name not in _UNITS:
-            raise ValueError(f"{name} is not simulated: choose from {', '.join(_UNITS)}")
-        if period < CYCLE:
-            raise ValueError(f"{name} every {period} s: the glider's cycle is {CYCLE} s")
-    return SensorList(SENSORS, frozenset(cadence) | {TIME})
+
+    sensors: SensorList
+    cadence: Mapping[str, float]
+    nth_yo: Mapping[str, int] = field(default_factory=dict)
+
+
+def everything(sensors: tuple[Sensor, ...], step: float) -> Selection:
+    """All sensors whenever they are updated, as in a full-rate file; ``step`` is the cycle (s)."""
+    names = [sensor.name for sensor in sensors]
+    return Selection(SensorList(sensors, frozenset(names)), dict.fromkeys(names, step))
+
+
+Table = tuple[Array, NDArray[np.bool_]]
 
 
 @dataclass(slots=True)
 class Log:
-    """The log on board: updates of sensors at numbered cycles, from ``start`` (s) on.
+    """The log of one computer: updates of sensors at numbered cycles of ``step`` s, from ``start`` (s) on.
 
-    ``state`` holds the last value of every sensor before the updates that are still pending.
+    ``time`` names its sensor of time and ``skew`` is the error of its clock (s). ``state`` holds the last
+    value of every sensor before the updates that are still pending. ``yos`` holds the cycle at which
+    each yo began and its number in its dive. ``mission`` is the cycle at which the mission began.
     """
 
     start: float
     state: dict[str, float]
+    step: float
+    time: str
+    skew: float = 0.0
+    mission: int = 0
+    yos: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)])
     pending: dict[str, list[tuple[NDArray[np.int64], Array]]] = field(default_factory=dict)
 
     def add(self, name: str, cycles: ArrayLike, values: ArrayLike) -> None:
@@ -127,15 +91,17 @@ class Log:
         row = np.broadcast_to(np.asarray(values, dtype=np.float64), at.shape)
         self.pending.setdefault(name, []).append((at, row))
 
-    def cut(
-        self, first: int, last: int, sensors: SensorList, cadence: Mapping[str, float]
-    ) -> tuple[Array, NDArray[np.bool_]]:
-        """The table of a file from cycle ``first`` to ``last``; updates up to there become `state`.
+    def clock(self, cycles: ArrayLike) -> Array:
+        """What the clock of the computer shows at some cycles (s)."""
+        return np.asarray(self.start + self.skew + self.step * np.asarray(cycles))
+
+    def cut(self, first: int, last: int, selections: Sequence[Selection]) -> list[Table]:
+        """The tables of files from cycle ``first`` to ``last``; updates up to there become `state`.
 
         Returns:
-            Values and updated flags as in `SegmentData`.
+            For each selection values and updated flags as in `SegmentData`.
         """
-        before, due = dict(self.state), {}
+        before, updates = dict(self.state), {}
         for name, parts in self.pending.items():
             at, row = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
             order = np.argsort(at, kind="stable")
@@ -145,21 +111,47 @@ class Log:
                 before[name] = float(row[i - 1])
             if j:
                 self.state[name] = float(row[j - 1])
-            if name in cadence:
-                due[name] = _first_of_each(at[i:j], row[i:j], first, round(cadence[name] / CYCLE))
+            updates[name] = at[i:j], row[i:j]
             self.pending[name] = [(at[j:], row[j:])]
-        cycles = np.unique(np.concatenate([at for at, _ in due.values()]))
-        before[TIME] = self.start + CYCLE * (first - 1)
-        values, updated = _table(sensors, before, cycles, due)
-        time_column = [sensor.name for sensor in sensors.columns].index(TIME)
-        values[1:, time_column], updated[1:, time_column] = self.start + CYCLE * cycles, True
-        return values, updated
+        return [self._select(first, selection, before, updates) for selection in selections]
+
+    def _select(
+        self,
+        first: int,
+        selection: Selection,
+        before: Mapping[str, float],
+        updates: Mapping[str, tuple[NDArray[np.int64], Array]],
+    ) -> Table:
+        due = {}
+        for name, (at, row) in updates.items():
+            if name not in selection.cadence or not len(at):
+                continue
+            kept = self._is_on_yo(at, selection.nth_yo.get(name, 1))
+            period = round(selection.cadence[name] / self.step)
+            due[name] = _first_of_each(at[kept], row[kept], first, period)
+        cycles = np.unique(np.concatenate([np.empty(0, np.int64), *(at for at, _ in due.values())]))
+        for name, zero in ((self.time, None), (SECONDS, self.mission), (SCIENCE_SECONDS, self.mission)):
+            if name == self.time or name in selection.cadence:
+                origin = 0.0 if zero is None else float(self.clock(zero))
+                before = {**before, name: float(self.clock(first - 1)) - origin}
+                due[name] = cycles, self.clock(cycles) - origin
+        return _table(selection.sensors, before, cycles, due)
+
+    def _is_on_yo(self, at: NDArray[np.int64], n: int) -> NDArray[np.bool_]:
+        """Where a sensor is sent that is so on every n-th yo."""
+        if n == 1:
+            return np.ones(len(at), dtype=bool)
+        begun, number = np.array(self.yos).T
+        return np.asarray(number[np.searchsorted(begun, at, "right") - 1] % n == 0)
 
 
 def _first_of_each(
     at: NDArray[np.int64], row: Array, first: int, period: int
 ) -> tuple[NDArray[np.int64], Array]:
-    """The first update of each ``period`` cycles."""
+    """The first update of each ``period`` cycles; updates of one cycle count as one, the last of them."""
+    at, last = at[::-1], row[::-1]
+    at, index = np.unique(at, return_index=True)
+    row = last[index]
     _, index = np.unique((at - first) // period, return_index=True)
     return at[index], row[index]
 
@@ -169,7 +161,7 @@ def _table(
     state: Mapping[str, float],
     cycles: NDArray[np.int64],
     due: Mapping[str, tuple[NDArray[np.int64], Array]],
-) -> tuple[Array, NDArray[np.bool_]]:
+) -> Table:
     """The state as first row, then the updates that are due, one row a cycle."""
     values = np.full((len(cycles) + 1, len(sensors.columns)), np.nan)
     updated = np.zeros(values.shape, dtype=bool)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gliderwatch.model import Array
+from gliderwatch.simulate.faults import Health
 from gliderwatch.simulate.ocean import Ocean
-from gliderwatch.simulate.onboard import Point, Vector, offset
+from gliderwatch.simulate.onboard import Point, Vector, displacement, offset, turn
 from gliderwatch.simulate.scenario import DiveTruth, Scenario
 from gliderwatch.simulate.telemetry import CYCLE, Log
 
@@ -21,28 +23,45 @@ NODE = 15
 class Glider:
     """State of a glider.
 
-    ``place``, ``east`` and ``north`` (m from the launch) are true. ``fix`` is the last fix, had at
-    ``fix_cycle``; ``drift`` (m/s, true north) the drift at the surface as seen by fixes; ``water``
-    (m/s, magnetic north) the current it reckons with; ``waypoint`` the index of its goal.
+    ``place``, ``east`` and ``north`` (m from the origin of the sea) are true. ``fix`` is the last fix,
+    had at ``fix_cycle``; ``drift`` (m/s, true north) the drift at the surface as seen by fixes; ``water``
+    (m/s, magnetic north) the current it reckons with; ``waypoint`` the index of its goal; ``lmc`` the
+    origin of its local mission coordinates. ``against`` (unit vector) is the way of the current that
+    sets against it; ``inflections`` counts, ``charge`` (A h) is used up. ``rng`` moves the glider,
+    ``luck`` all that came to be simulated later, so that neither disturbs the other.
     """
 
     scenario: Scenario
     ocean: Ocean
     rng: np.random.Generator
+    luck: np.random.Generator
     log: Log
+    science: Log
     place: Point
     fix: Point
-    cycle: int = 0
+    lmc: Point
     east: float = 0.0
     north: float = 0.0
+    cycle: int = 0
     fix_cycle: int = 0
     drift: Vector = Vector(0.0, 0.0)
     water: Vector = Vector(0.0, 0.0)
     waypoint: int = 0
+    against: Vector = Vector(0.0, 0.0)
+    inflections: int = 0
+    charge: float = 0.0
+    health: Health = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.health = self.scenario.health
 
     def time(self, cycle: int) -> float:
         """Time (s) of a cycle."""
         return self.scenario.start + CYCLE * cycle
+
+    def times(self, cycles: NDArray[np.int64]) -> Array:
+        """Times (s) of some cycles."""
+        return np.asarray(self.scenario.start + CYCLE * cycles, dtype=np.float64)
 
     def move(self, end: int, east: float, north: float) -> None:
         """Be ``east`` and ``north`` (m) of here at cycle ``end``."""
@@ -50,13 +69,20 @@ class Glider:
         self.place, self.cycle = Point(float(lat), float(lon)), end
         self.east, self.north = self.east + east, self.north + north
 
-    def carried(self, t: Array, east: Array, north: Array) -> tuple[Array, Array]:
-        """How far (m) the current has carried it at ``t`` (s) while it made ``east``, ``north`` (m)."""
+    def carried(self, t: Array, east: Array, north: Array, depth: Array | float = 0.0) -> tuple[Array, Array]:
+        """How far (m) the current has carried it at ``t`` (s) and ``depth`` (m) while it made
+        ``east``, ``north`` (m)."""
         far_east, far_north = np.zeros_like(t), np.zeros_like(t)
+        added = self.health.stream(t)
         for _ in range(2):
-            u, v = self.ocean.current(t, self.east + east + far_east, self.north + north + far_north)
-            far_east, far_north = integral(t, u), integral(t, v)
+            u, v = self.ocean.current(t, self.east + east + far_east, self.north + north + far_north, depth)
+            far_east = integral(t, u + added * self.against.east)
+            far_north = integral(t, v + added * self.against.north)
         return far_east, far_north
+
+    def to_lmc(self, place: Point) -> Vector:
+        """Local mission coordinates (m, magnetic north) of a place."""
+        return turn(displacement(self.lmc, place), self.scenario.variation)
 
 
 class Flown(NamedTuple):
