@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 import time
 from pathlib import Path
@@ -13,6 +14,8 @@ from rich.text import Text
 
 from gliderwatch import __version__
 from gliderwatch.errors import GliderwatchError
+from gliderwatch.score.command import score
+from gliderwatch.simulate.command import simulate
 
 # What a command needs is imported in it: `status` in a health check must not wait for what `run` needs.
 
@@ -32,11 +35,15 @@ class _Group(click.Group):
         try:
             return super().invoke(ctx)
         except GliderwatchError as error:
-            _fail(error)
+            _fail(str(error))
+        except BrokenPipeError:  # `| head` has seen enough: click ends without a word
+            raise
+        except OSError as error:  # a full disk, a folder that is closed
+            _fail(f"cannot go on: {error}")
 
 
-def _fail(error: Exception) -> NoReturn:
-    Console(stderr=True).print(Text(str(error)), soft_wrap=True)
+def _fail(text: str) -> NoReturn:
+    Console(stderr=True).print(Text(text), soft_wrap=True)
     sys.exit(2)
 
 
@@ -44,6 +51,13 @@ def _fail(error: Exception) -> NoReturn:
 @click.version_option(__version__)
 def main() -> None:
     """Watch a glider dockserver, and alert the pilot when a glider flies abnormally."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a terminal may not know every sign, a name may be no text
+            stream.reconfigure(errors="replace")
+
+
+main.add_command(simulate)
+main.add_command(score)
 
 
 @main.command()
@@ -93,7 +107,15 @@ def _replay(request: Request) -> None:
 
     console = Console()
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    # What is written to a file must not be led to the terminal, where the bar is.
+    bar = Progress(
+        *columns,
+        console=Console(stderr=True),
+        transient=True,
+        redirect_stdout=sys.stdout.isatty(),
+        disable=not sys.stderr.isatty(),
+    )
+    with bar as progress:
         task = progress.add_task("files", total=None)
 
         def on_file(taken: Taken) -> None:
@@ -115,7 +137,7 @@ def _report(report: Report, request: Request, console: Console) -> None:
     left_out = report.store.files(Status.WAITING, Status.QUARANTINED, Status.UNKNOWN)
     tables.files(dict(report.files), left_out, console)
     if request.out is not None:
-        console.print(f"written: {request.out}/assessments.jsonl and alerts.jsonl")
+        console.print(Text(f"written: {request.out}/assessments.jsonl and alerts.jsonl"), soft_wrap=True)
     if report.undelivered:
         raise GliderwatchError(f"{report.undelivered} messages could not be delivered in time")
 

@@ -1,0 +1,170 @@
+"""Faults put onto real missions, segment by segment. Pure.
+
+What is real stays real: currents, gaps, artefacts, cadences, the order of things. From a moment on the
+glider is made slower, or its reported current wrong. What the fault would have changed beyond the
+data (another way steered, later surfacings) is not there: the mission goes on as it was flown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from itertools import pairwise
+
+import numpy as np
+
+from gliderwatch.model import Array, Dive, Segment, Series, readonly
+from gliderwatch.navigation.dives import Navigation, extend
+from gliderwatch.navigation.frame import from_plane, magnetic_to_true
+from gliderwatch.navigation.track import closure
+
+_POSITIONS = ("fix", "dr")
+_CURRENTS = ("current", "current_initial", "current_final")
+_SLOWED = ("speed_onboard", "depth_rate", "depth")
+_SURFACE = 5.0
+"""Metres: where a glider counts as at the surface stays where it is."""
+_LEG = 20e3
+
+
+class GraftKind(StrEnum):
+    """What is grafted; `Graft` says what its size is."""
+
+    SLOWED = "slowed"
+    DAC_WRONG = "dac_wrong"
+
+
+@dataclass(frozen=True, slots=True)
+class Graft:
+    """A fault to put onto a real mission.
+
+    ``size`` is of `slowed` the part of the speed through the water that is lost (drag on the whole body:
+    depth rate and the glider's own speed fall with it, the current stays right), of `dac_wrong` the error
+    of the current to the left of the way (m/s; the glider is healthy). Raises ValueError for a
+    size that cannot be.
+    """
+
+    kind: GraftKind
+    size: float
+
+    def __post_init__(self) -> None:
+        low, high = (0.0, 0.95) if self.kind is GraftKind.SLOWED else (-2.0, 2.0)
+        if not low <= self.size <= high:
+            raise ValueError(f"{self.kind} of size {self.size:g}: it is {low:g} to {high:g}")
+
+
+def navigate(segments: Iterable[Segment]) -> list[Dive]:
+    """The dives of a mission whose segments come in the order of time."""
+    state, dives = Navigation(), dict[float, Dive]()
+    for segment in segments:
+        state, told = extend(state, segment)
+        dives |= {dive.t_dive: dive for dive in told}
+    return [dives[t] for t in sorted(dives) if dives[t].end is not None]
+
+
+def own_speeds(dives: Sequence[Dive]) -> dict[float, float]:
+    """By start of dive (s), the speed (m/s) that the glider's own reckoning had, where it can be known."""
+    found = {}
+    for dive in dives:
+        speed = closure(dive.track, dive.current).get("along_speed") if dive.track and dive.current else None
+        if speed is not None and 0.0 < speed < 1.5:
+            found[dive.t_dive] = speed
+    return found
+
+
+def grafted(segments: Sequence[Segment], graft: Graft, onset: float, usual: float) -> list[Segment]:
+    """The segments with a fault since ``onset`` (s); ``usual`` (m/s) is the speed of dives that tell none."""
+    dives = [dive for dive in navigate(segments) if dive.track is not None]
+    change = (
+        _slowed(dives, graft.size, onset, usual)
+        if graft.kind is GraftKind.SLOWED
+        else _wrong(dives, graft.size, onset)
+    )
+    declination, out = 0.0, []
+    for segment in segments:
+        declination = segment.declination if segment.declination is not None else declination
+        out.append(replace(segment, quantities=change(segment, declination)))
+    return out
+
+
+_Change = Callable[[Segment, float], Mapping[str, Series]]
+
+
+def _slowed(dives: Sequence[Dive], size: float, onset: float, usual: float) -> _Change:
+    """Takes a part of the way through the water out of all positions, and of speeds and depths."""
+    t, lost = lost_way(dives, size, onset, usual)
+
+    def change(segment: Segment, _: float) -> Mapping[str, Series]:
+        out = dict(segment.quantities)
+        for name in (n for n in _SLOWED if n in out):
+            at, v = out[name].t, out[name].v
+            kept = np.minimum(v, _SURFACE) if name == "depth" else 0.0
+            out[name] = Series(at, readonly(np.where(at < onset, v, kept + (1.0 - size) * (v - kept))))
+        for name in _POSITIONS:
+            lat, lon = segment.get(f"{name}_lat"), segment.get(f"{name}_lon")
+            if len(lat) and len(lat) == len(lon):
+                places = _moved(lat, lon, t, lost)
+                out |= {f"{name}_lat": Series(lat.t, places[0]), f"{name}_lon": Series(lon.t, places[1])}
+        return out
+
+    return change
+
+
+def lost_way(dives: Sequence[Dive], size: float, onset: float, usual: float) -> tuple[Array, Array]:
+    """Times (s) and the way (m: east, north) lost until then: part ``size`` of speed times heading."""
+    speeds, times, steps = own_speeds(dives), [onset - 1.0], [np.zeros(2)]
+    for dive in dives:
+        assert dive.track is not None
+        speed = speeds.get(dive.t_dive, usual)
+        for (a, b), heading in zip(pairwise(dive.track.t.tolist()), dive.track.heading, strict=True):
+            begin = max(a, onset)
+            if b > begin:
+                times += [begin, b]
+                steps += [np.zeros(2), size * speed * (b - begin) * heading]
+    return np.array(times), np.cumsum(steps, axis=0)
+
+
+def _moved(lat: Series, lon: Series, t: Array, lost: Array) -> tuple[Array, Array]:
+    """Positions (degrees) moved back by the way lost; one too far for a plane is moved in legs."""
+    way = np.stack([np.interp(lat.t, t, lost[:, 0]), np.interp(lat.t, t, lost[:, 1])], axis=-1)
+    places = [_back(*place) for place in zip(lat.v.tolist(), lon.v.tolist(), way, strict=True)]
+    return readonly([p[0] for p in places]), readonly([p[1] for p in places])
+
+
+def _back(lat: float, lon: float, way: Array) -> tuple[float, float]:
+    legs = 1 + int(np.hypot(*way) / _LEG)
+    for _ in range(legs):
+        lat, lon = from_plane(-way / legs, lat, lon)
+    return lat, lon
+
+
+def _wrong(dives: Sequence[Dive], size: float, onset: float) -> _Change:
+    """Adds to each reported current an error to the left of the dive that it is about."""
+    ends = np.array([dive.t_surface for dive in dives])
+
+    def change(segment: Segment, declination: float) -> Mapping[str, Series]:
+        out = dict(segment.quantities)
+        for name in _CURRENTS:
+            x, y = segment.get(f"{name}_x"), segment.get(f"{name}_y")
+            if not len(x) or len(x) != len(y):
+                continue
+            error = np.array([_error(dives, ends, t, size, onset) for t in x.t.tolist()])
+            error[(x.v == 0) & (y.v == 0)] = 0.0
+            error = magnetic_to_true(error, -declination)
+            out[f"{name}_x"] = Series(x.t, readonly(x.v + error[:, 0]))
+            out[f"{name}_y"] = Series(y.t, readonly(y.v + error[:, 1]))
+        return out
+
+    return change
+
+
+def _error(dives: Sequence[Dive], ends: Array, t: float, size: float, onset: float) -> Array:
+    """The error (m/s: east, north) of what is reported at ``t`` (s) of the dive that ended last."""
+    i = int(np.searchsorted(ends, t + 120.0)) - 1
+    if i < 0 or ends[i] < onset:
+        return np.zeros(2)
+    track = dives[i].track
+    assert track is not None
+    way = np.diff(track.t) @ track.heading
+    length = float(np.hypot(*way))
+    return size * np.array([-way[1], way[0]]) / length if length > 0 else np.zeros(2)

@@ -1,0 +1,266 @@
+"""From what came of each glider to what it says of the program. Pure; definitions in `docs/score.md`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gliderwatch.score.record import HEALTHY, Record, Told
+
+MONTH = 30.0 * 86400.0
+"""Seconds of a glider-month."""
+EXPECTED = {
+    "remora": 1,
+    "fouling": 1,
+    "wing_loss": 1,
+    "shark_strike": 1,
+    "net": 1,
+    "leak_of_oil": 1,
+    "ballast": 1,
+    "slowed": 1,
+    "compass": 2,
+    "dac_wrong": 2,
+}
+"""The flag that tells the truth of a fault; of those not named none does."""
+RESAMPLES, LEVEL = 1000, 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A number with its bootstrap interval of 95 %; all may be infinite."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """The first message after the onset with the flag expected: how many surfacings and hours after it."""
+
+    surfacings: int
+    hours: float
+
+
+@dataclass(frozen=True, slots=True)
+class FaultScore:
+    """One estimator on one fault of one size, in one sea or (``sea`` empty) in all.
+
+    ``expected`` is the flag that tells the truth (None: the glider is healthy), ``detected`` the part of
+    gliders of which it was told, ``chance`` the part that false messages alone would have made. Delays
+    are quantiles over all gliders: infinite where too few were detected. ``flag_1``, ``flag_2`` are the
+    parts of gliders that got such a message, ``first`` those whose first message was of the flag
+    expected; ``unexpected`` counts messages of another flag than that a glider-month.
+    """
+
+    estimator: str
+    fault: str
+    size: float
+    sea: str
+    is_real: bool
+    gliders: int
+    expected: int | None
+    detected: Interval | None
+    chance: float
+    surfacings_median: float
+    surfacings_90: float
+    hours_median: float
+    hours_90: float
+    flag_1: float
+    flag_2: float
+    first: float
+    unexpected: Interval
+
+
+@dataclass(frozen=True, slots=True)
+class FalseScore:
+    """False messages of one estimator a glider-month, in one sea or (``sea`` empty) in all.
+
+    ``dives_1``, ``dives_2`` are the parts of judged dives with a false flag: an incident that is false and
+    never ends is one message.
+    """
+
+    estimator: str
+    sea: str
+    is_real: bool
+    gliders: int
+    months: float
+    flag_1: Interval
+    flag_2: Interval
+    dives_1: float
+    dives_2: float
+
+
+# --------------------------------------------------------------------------- one glider
+
+
+def after_onset(record: Record) -> list[Told]:
+    """The messages about surfacings after the onset."""
+    return [t for t in record.told if record.onset is not None and t.t_surface > record.onset]
+
+
+def detection(record: Record) -> Detection | None:
+    """When a fault was told with the right flag, None if never."""
+    expected = EXPECTED.get(record.fault)
+    times = [t.told for t in after_onset(record) if t.flag == expected]
+    if not times or record.onset is None:
+        return None
+    told = min(times)
+    count = sum(record.onset < t <= told for t in record.surfacings)
+    return Detection(count, (told - record.onset) / 3600)
+
+
+def healthy_time(record: Record) -> float:
+    """Seconds in which any message is false."""
+    return (record.onset if record.onset is not None else record.end) - record.start
+
+
+def false_told(record: Record, flag: int) -> int:
+    """Messages of a flag on a healthy glider or before the onset."""
+    return sum(t.flag == flag and _is_healthy(record, t.t_surface) for t in record.told)
+
+
+def _is_healthy(record: Record, t: float) -> bool:
+    return record.onset is None or t <= record.onset
+
+
+# --------------------------------------------------------------------------- many gliders
+
+
+def bootstrap(gliders: Sequence[Record], number: Callable[[Sequence[Record]], float]) -> Interval:
+    """A number of many gliders with the percentiles of the same of gliders drawn anew with replacement."""
+    value = number(gliders)
+    rng = np.random.default_rng(0)
+    drawn = [
+        number([gliders[i] for i in rng.integers(len(gliders), size=len(gliders))]) for _ in range(RESAMPLES)
+    ]
+    low, high = np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    return Interval(value, float(low), float(high))
+
+
+def quantile(values: Iterable[float], part: float) -> float:
+    """The smallest value that ``part`` of all do not exceed; infinite values are allowed.
+
+    >>> quantile([1.0, 5.0, math.inf], 0.5), quantile([1.0, 5.0, math.inf], 0.9)
+    (5.0, inf)
+    """
+    ordered = sorted(values)
+    return ordered[max(math.ceil(part * len(ordered)) - 1, 0)]
+
+
+def share(gliders: Sequence[Record], of: Callable[[Record], bool]) -> float:
+    """The part of gliders of which something holds."""
+    return sum(map(of, gliders)) / len(gliders)
+
+
+def fault_scores(records: Iterable[Record]) -> list[FaultScore]:
+    """For each estimator, fault and size, in each sea and in all."""
+    records = list(records)
+    groups: dict[tuple[str, str, float, str, bool], list[Record]] = {}
+    for r in records:
+        for sea in (r.sea, "") if r.fault != HEALTHY else ():
+            groups.setdefault((r.estimator, r.fault, r.size, sea, r.is_real), []).append(r)
+    rates = {(f.estimator, f.sea, f.is_real): f for f in false_scores(records) if f.sea}
+    return [_fault_score(*group, gliders, rates) for group, gliders in groups.items()]
+
+
+Rates = Mapping[tuple[str, str, bool], "FalseScore"]
+
+
+def by_chance(record: Record, rates: Rates) -> float:
+    """How likely a false message of the flag expected is after the onset, at the rate of its sea."""
+    score = rates.get((record.estimator, record.sea, record.is_real))
+    if score is None or record.onset is None or record.fault not in EXPECTED:
+        return 0.0
+    rate = score.flag_1.value if EXPECTED[record.fault] == 1 else score.flag_2.value
+    return 1 - math.exp(-rate * (record.end - record.onset) / MONTH)
+
+
+def _fault_score(
+    estimator: str,
+    fault: str,
+    size: float,
+    sea: str,
+    is_real: bool,
+    gliders: Sequence[Record],
+    rates: Rates,
+) -> FaultScore:
+    expected = EXPECTED.get(fault)
+    found = [detection(r) for r in gliders]
+    never = Detection(0, math.inf)
+    surfacings = [math.inf if d is None else float(d.surfacings) for d in found]
+    hours = [(d or never).hours for d in found]
+    return FaultScore(
+        estimator,
+        fault,
+        size,
+        sea,
+        is_real,
+        len(gliders),
+        expected,
+        None
+        if expected is None
+        else bootstrap(gliders, lambda some: share(some, lambda r: detection(r) is not None)),
+        sum(by_chance(r, rates) for r in gliders) / len(gliders),
+        quantile(surfacings, 0.5),
+        quantile(surfacings, 0.9),
+        quantile(hours, 0.5),
+        quantile(hours, 0.9),
+        share(gliders, lambda r: any(t.flag == 1 for t in after_onset(r))),
+        share(gliders, lambda r: any(t.flag == 2 for t in after_onset(r))),
+        share(gliders, lambda r: _first_flag(r) == expected),
+        _rate(gliders, _unexpected, lambda r: r.end - (r.onset if r.onset is not None else r.start)),
+    )
+
+
+def _first_flag(record: Record) -> int | None:
+    return next((t.flag for t in sorted(after_onset(record), key=lambda t: t.told)), None)
+
+
+def _unexpected(record: Record) -> int:
+    return sum(t.flag != EXPECTED.get(record.fault) for t in after_onset(record))
+
+
+def _rate(
+    gliders: Sequence[Record], count: Callable[[Record], int], seconds: Callable[[Record], float]
+) -> Interval:
+    """Messages a glider-month; of none the upper bound is that of a Poisson count, 3 / months."""
+    months = sum(map(seconds, gliders)) / MONTH
+
+    def rate(some: Sequence[Record]) -> float:
+        return sum(map(count, some)) * MONTH / sum(map(seconds, some))
+
+    found = bootstrap(gliders, rate)
+    return found if found.value > 0 else Interval(0.0, 0.0, 3.0 / months)
+
+
+def false_scores(records: Iterable[Record]) -> list[FalseScore]:
+    """For each estimator in each sea, and in all. The sizes of a fault share a glider that counts once."""
+    gliders: dict[tuple[str, bool, tuple[str, str, int]], Record] = {}
+    for r in records:
+        if not (r.is_real and r.fault != HEALTHY):  # the same days of the same mission
+            gliders.setdefault((r.estimator, r.is_real, r.glider), r)
+    groups: dict[tuple[str, str, bool], list[Record]] = {}
+    for (estimator, is_real, _), r in gliders.items():
+        for sea in (r.sea, ""):
+            groups.setdefault((estimator, sea, is_real), []).append(r)
+    return [_false_score(*group, some) for group, some in groups.items()]
+
+
+def _false_score(estimator: str, sea: str, is_real: bool, gliders: Sequence[Record]) -> FalseScore:
+    flags = [d.flag for r in gliders for d in r.dives if d.flag is not None and _is_healthy(r, d.t_surface)]
+    judged = max(len(flags), 1)
+    return FalseScore(
+        estimator,
+        sea,
+        is_real,
+        len(gliders),
+        sum(map(healthy_time, gliders)) / MONTH,
+        _rate(gliders, lambda r: false_told(r, 1), healthy_time),
+        _rate(gliders, lambda r: false_told(r, 2), healthy_time),
+        flags.count(1) / judged,
+        flags.count(2) / judged,
+    )

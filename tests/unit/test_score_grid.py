@@ -1,0 +1,106 @@
+"""What the score runs: grids, estimators, keys of results."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from gliderwatch.errors import ConfigError, GliderwatchError
+from gliderwatch.score import work
+from gliderwatch.score.estimators import check, configuration, known
+from gliderwatch.score.grid import cells, folder, load_grid
+from gliderwatch.score.pool import to_do
+from gliderwatch.simulate.faults import FaultKind
+
+SMALL = load_grid("small")
+
+
+@pytest.mark.parametrize("path", sorted(folder().glob("*.yml")), ids=lambda p: p.stem)
+def test_shipped_grids_have_what_they_say(path):
+    grid = load_grid(path.stem)
+    found = cells(grid)
+    sizes = sum(map(len, grid.faults.values()))
+    healthy = len(grid.healthy.seas) * grid.healthy.gliders
+    assert len(found) == sizes * len(grid.seas) * grid.gliders + healthy
+    assert len({cell.name for cell in found}) == len(found)
+
+
+def test_the_default_grid_holds_every_fault():
+    assert set(load_grid("default").faults) == set(FaultKind) - {FaultKind.NONE}
+
+
+def test_sizes_share_a_glider_and_nothing_else_does():
+    found = [c for c in cells(load_grid("default")) if c.sea == "calm"]
+    seeds = {(c.fault, c.seed): c.scenario.seed for c in found}
+    assert len(set(seeds.values())) == len(seeds)
+    assert all(c.scenario.seed == seeds[c.fault, c.seed] for c in found)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("sea: [calm]", "unknown field `sea`"),
+        ("seas: [clam]", "there is no scenario clam"),
+        ("faults: {remra: [2]}", "remra"),
+        ("faults: {remora: [0.5]}", "remora of size 0.5"),
+        ("grafts: {slowed: [2]}", "slowed of size 2"),
+        ("onset: 12", "onset"),
+        ("normal: [1.3, 0.7]", "normal"),
+        ("a: [", "score.yml"),
+    ],
+)
+def test_a_wrong_grid_is_refused_in_words(tmp_path, text, said):
+    path = tmp_path / "score.yml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=said):
+        cells(load_grid(str(path)))
+
+
+def test_no_such_grid():
+    with pytest.raises(ConfigError, match="there is no grid defalt"):
+        load_grid("defalt")
+
+
+def test_an_unknown_estimator_is_refused_with_the_known_ones():
+    assert check("adaptive:franklin") in known()
+    with pytest.raises(
+        GliderwatchError, match=r"no estimator adaptve; known are: adaptive, adaptive:franklin"
+    ):
+        check("adaptve")
+
+
+def test_an_estimator_is_settings_of_a_pilot():
+    params = configuration("adaptive:usf-stella", "sim", 0.2, 0.3).glider("sim")
+    assert (params.speed_min, params.speed_max) == (0.2, 0.3)
+    assert (params.estimator.gamma, params.estimator.gamma_f) == (1e-7, 1.0)
+
+
+def test_a_key_changes_with_all_that_a_result_depends_on(monkeypatch):
+    cell = cells(SMALL)[0]
+    keys = {
+        work.key(cell, "adaptive"),
+        work.key(cell, "adaptive:franklin"),
+        work.key(replace(cell, normal=(0.6, 1.3)), "adaptive"),
+        work.key(replace(cell, scenario=replace(cell.scenario, seed=5)), "adaptive"),
+    }
+    monkeypatch.setattr(work, "version", lambda: "another")
+    keys.add(work.key(cell, "adaptive"))
+    assert len(keys) == 5
+
+
+def test_the_key_of_a_real_mission_knows_its_files(tmp_path):
+    mission = tmp_path / "unit"
+    mission.mkdir()
+    (mission / "a.sbd").write_bytes(b"1")
+    cell = cells(replace(SMALL, healthy=replace(SMALL.healthy, gliders=0), faults={}), (mission,))[0]
+    before = work.key(cell, "adaptive")
+    (mission / "b.sbd").write_bytes(b"2")
+    assert work.key(cell, "adaptive") != before
+
+
+def test_what_is_done_or_broken(tmp_path: Path):
+    found = cells(SMALL)
+    path = work.result_path(tmp_path, found[0], "adaptive")
+    path.parent.mkdir(parents=True)
+    path.write_text("{ cut")
+    assert len(to_do(found, ["adaptive"], tmp_path)) == len(found)
