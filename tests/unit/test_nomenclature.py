@@ -1,0 +1,116 @@
+"""`docs/nomenclature.md` has every quantity, field, key and parameter of the code, and nothing else."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from gliderwatch.estimation.adaptive import AdaptiveParams
+from gliderwatch.ingest.decode import decode
+from gliderwatch.ingest.segment import QUANTITIES
+from gliderwatch.model import Assessment
+from gliderwatch.params import AnomalyRule, EstimatorParams, FalseAlarmRule, GliderParams, RuleParams
+from gliderwatch.pipeline import GliderState, process
+from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.simulate.glider import simulate
+from gliderwatch.simulate.scenario import Scenario
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "nomenclature.md"
+NAVIGATION = ROOT / "src" / "gliderwatch" / "navigation"
+
+
+def tables(heading: str) -> list[list[str]]:
+    """The rows of all tables of one section, without their heads: the cells as text."""
+    text = PAGE.read_text(encoding="utf-8")
+    section = re.search(rf"^## {heading}\n(.*?)(?=^## |\Z)", text, re.DOTALL | re.MULTILINE)
+    assert section is not None, f"no section {heading} in {PAGE.name}"
+    rows = [line.strip("|").split("|") for line in section[1].splitlines() if line.startswith("| `")]
+    return [[cell.strip() for cell in row] for row in rows]
+
+
+def named(heading: str) -> list[str]:
+    return [row[0].strip("`") for row in tables(heading)]
+
+
+def test_quantities_with_units_and_sensors() -> None:
+    shown = [(row[0].strip("`"), row[1], row[2], row[4]) for row in tables("Quantities of a file")]
+    made = [
+        (q.name, q.unit, f"{', '.join(f'`{s}`' for s in q.sensors)} ({q.slocum_unit})", q.about)
+        for q in QUANTITIES
+    ]
+    assert shown == made
+
+
+def test_ranges_of_quantities() -> None:
+    shown = {row[0].strip("`"): row[3] for row in tables("Quantities of a file")}
+    values = {"2π": 6.2832, "π": 3.1416, "π/2": 1.5708}
+    for quantity in QUANTITIES:
+        low, high = (
+            (-1.0 if bound.startswith("−") else 1.0)
+            * (values.get(bound.lstrip("−")) or float(bound.lstrip("−")))
+            for bound in shown[quantity.name].split(" to ")
+        )
+        assert (low, high) == pytest.approx((quantity.low, quantity.high), rel=1e-4), quantity.name
+
+
+def test_fields_of_an_assessment() -> None:
+    assert named("Assessment") == [field.name for field in fields(Assessment)]
+
+
+def test_parameters() -> None:
+    kinds = (GliderParams, EstimatorParams, RuleParams, AnomalyRule, FalseAlarmRule, AdaptiveParams)
+    assert named("Parameters") == [
+        f"{kind.__name__}.{field.name}" for kind in kinds for field in fields(kind)
+    ]
+
+
+def keys_in_code() -> set[str]:
+    """Names under which navigation puts numbers into dictionaries, read from its source."""
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in NAVIGATION.glob("*.py")]
+    functions = [
+        node
+        for tree in trees
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef) and _gives_numbers(node)
+    ]
+    return {key for function in functions for key in _keys(function)}
+
+
+def _gives_numbers(function: ast.FunctionDef) -> bool:
+    """Whether a function returns evidence, or makes a dive with it."""
+    gives = ast.unparse(function.returns) if function.returns is not None else ""
+    return gives == "dict[str, float]" or function.name == "_dive"
+
+
+def _keys(function: ast.FunctionDef) -> Iterator[str]:
+    for node in ast.walk(function):
+        if isinstance(node, ast.Dict):
+            yield from (_text(key) for key in node.keys if _text(key))
+        elif isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store):
+            yield from (_text(node.slice),) if _text(node.slice) else ()
+        elif isinstance(node, ast.Tuple) and len(node.elts) == 2 and not _text(node.elts[1]):
+            yield from (_text(node.elts[0]),) if _text(node.elts[0]) else ()
+
+
+def _text(node: ast.AST | None) -> str:
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
+
+
+def test_keys_of_evidence() -> None:
+    assert set(named("Evidence")) == keys_in_code()
+
+
+def test_keys_of_evidence_of_a_simulated_mission(tmp_path: Path) -> None:
+    state, emitted = GliderState(), set[str]()
+    for path in write_mission(tmp_path / "gliders", tmp_path / "cache", simulate(Scenario(days=0.5))):
+        outcome = process(state, decode(path, [tmp_path / "cache"]), GliderParams())
+        state = outcome.state
+        emitted |= {key for a in outcome.assessments for key in a.evidence}
+    assert {"along_speed", "depth_rate_climb", "duration_h"} <= emitted
+    assert emitted <= set(named("Evidence"))
