@@ -1,0 +1,126 @@
+"""Order and fairness of the files that wait to be decoded and taken."""
+
+from __future__ import annotations
+
+import pytest
+
+from gliderwatch.errors import Quarantine
+from gliderwatch.ingest.header import Header
+from gliderwatch.model import SegmentId
+from gliderwatch.run.backlog import AHEAD, Backlog, Job
+from gliderwatch.store.sqlite import File, Status
+
+DONE = Quarantine("for the sake of the test")
+
+
+def job(glider: str, opened_at: float, path: str = "") -> Job:
+    name = f"{glider}-2024-1-0-{opened_at:.0f}"
+    header = Header(SegmentId(opened_at, glider, name), "m.mi", "sbd", "0", True, 9, 9, "1", 100)
+    return Job(File(path or f"/{name}.sbd", 1, 1, Status.WAITING, glider, name), header)
+
+
+def started(backlog: Backlog, n: int) -> list[Job]:
+    """The next n files, all being decoded now."""
+    jobs = [backlog.next() for _ in range(n)]
+    return [job for job in jobs if job is not None]
+
+
+def test_files_of_a_glider_are_decoded_oldest_first() -> None:
+    backlog = Backlog()
+    for opened_at in (3.0, 1.0, 2.0):
+        backlog.add(job("a", opened_at))
+    assert [j.header.id.opened_at for j in started(backlog, 9)] == [1.0, 2.0, 3.0]
+
+
+def test_gliders_take_turns() -> None:
+    backlog = Backlog()
+    for glider in ("a", "b"):
+        for opened_at in (1.0, 2.0, 3.0):
+            backlog.add(job(glider, opened_at))
+    backlog.add(job("c", 9.0))
+    assert [j.header.id.glider for j in started(backlog, 9)] == ["a", "b", "c", "a", "b", "a", "b"]
+
+
+def test_a_file_is_taken_after_those_before_it() -> None:
+    backlog = Backlog()
+    for opened_at in (1.0, 2.0):
+        backlog.add(job("a", opened_at))
+    first, second = started(backlog, 2)
+    backlog.finish(second, DONE)
+    assert backlog.decoded("a") is None
+    backlog.finish(first, DONE)
+    assert backlog.decoded("a") is first
+    assert backlog.decoded("a") is second
+    assert backlog.decoded("a") is None
+
+
+def test_a_slow_file_delays_its_own_glider_alone() -> None:
+    backlog = Backlog()
+    slow, other = job("a", 1.0), job("b", 1.0)
+    backlog.add(slow)
+    backlog.add(other)
+    started(backlog, 2)
+    backlog.finish(other, DONE)
+    assert backlog.decoded("b") is other
+    assert backlog.decoded("a") is None
+
+
+def test_no_more_of_a_glider_are_decoded_than_are_soon_taken() -> None:
+    backlog = Backlog()
+    for opened_at in range(AHEAD + 5):
+        backlog.add(job("a", float(opened_at)))
+    backlog.add(job("b", 1.0))
+    at_work = started(backlog, AHEAD + 6)
+    assert [j.header.id.glider for j in at_work].count("a") == AHEAD
+    assert [j.header.id.glider for j in at_work].count("b") == 1
+    backlog.finish(at_work[0], DONE)
+    assert backlog.next() is None, "decoded, but not taken yet"
+    assert backlog.decoded("a") is at_work[0]
+    assert backlog.next() is not None
+
+
+def test_it_counts_what_is_at_hand_and_what_is_being_decoded() -> None:
+    backlog = Backlog()
+    for opened_at in (1.0, 2.0):
+        backlog.add(job("a", opened_at))
+    assert (len(backlog), backlog.decoding, backlog.more("a")) == (2, 0, True)
+    first, second = started(backlog, 2)
+    assert (len(backlog), backlog.decoding) == (2, 2)
+    backlog.finish(first, DONE)
+    assert (len(backlog), backlog.decoding) == (2, 1)
+    backlog.decoded("a")
+    assert (len(backlog), backlog.more("a")) == (1, True)
+    backlog.finish(second, DONE)
+    backlog.decoded("a")
+    assert (len(backlog), backlog.decoding, backlog.more("a")) == (0, 0, False)
+
+
+@pytest.mark.parametrize("begin", [False, True])
+def test_a_file_that_is_at_hand_is_not_put_in_twice(begin: bool) -> None:
+    backlog = Backlog()
+    first = job("a", 1.0)
+    backlog.add(first)
+    if begin:
+        backlog.next()
+    backlog.add(job("a", 1.0))
+    assert len(backlog) == 1
+    assert len(started(backlog, 9)) == (0 if begin else 1)
+
+
+def test_a_file_can_come_again_once_it_was_taken() -> None:
+    backlog = Backlog()
+    first = job("a", 1.0)
+    backlog.add(first)
+    backlog.next()
+    backlog.finish(first, DONE)
+    backlog.decoded("a")
+    again = job("a", 1.0)
+    backlog.add(again)
+    assert backlog.next() is again
+
+
+def test_two_files_of_one_segment_are_both_kept() -> None:
+    backlog = Backlog()
+    for path in ("/long.sbd", "/00010001.sbd"):
+        backlog.add(job("a", 1.0, path))
+    assert [j.file.path for j in started(backlog, 3)] == ["/00010001.sbd", "/long.sbd"]
