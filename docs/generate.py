@@ -41,8 +41,8 @@ A key that is given as `null` counts as given, where `null` has a meaning.
 
 ## Names and paths
 
-Gliders are matched by the name of their folder in lower case. A folder of a glider that is not under
-`gliders` is listed by `check` and `status`, and not watched. Relative paths start at the folder of
+Gliders are matched by the name in the headers of their files, in lower case. A glider that is not
+under `gliders` is listed by `check` and `status`, and not watched. Relative paths start at the folder of
 the configuration file. Patterns know `*`, `?` and `[...]`; they are looked up again at each rescan.
 
 ## Secrets

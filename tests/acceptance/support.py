@@ -261,7 +261,7 @@ class Daemon:
         with self.log_path.open("ab") as log:
             self.process = subprocess.Popen(
                 [*self.program, "run", "-c", self.site.config],
-                env=os.environ | self.env,
+                env=os.environ | {"TMPDIR": str(self.scratch)} | self.env,
                 stderr=log,
                 stdout=log,
             )

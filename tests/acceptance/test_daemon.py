@@ -40,6 +40,7 @@ def test_sigterm_ends_it_cleanly(site: Site, daemon: Daemon) -> None:
     assert daemon.stop() == 0
     until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in workers), "no process is left")
     assert daemon.log("stopped")
+    assert list(daemon.scratch.iterdir()) == []
 
 
 def test_no_process_is_left_after_sigkill(site: Site) -> None:

@@ -71,8 +71,9 @@ def test_parameters() -> None:
 
 
 def keys_in_code() -> set[str]:
-    """Names under which navigation puts numbers into dictionaries, read from its source."""
-    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in NAVIGATION.glob("*.py")]
+    """Names under which navigation and the estimate put numbers into dictionaries, read from the source."""
+    paths = [*NAVIGATION.glob("*.py"), NAVIGATION.parent / "estimation" / "glider.py"]
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in paths]
     functions = [
         node
         for tree in trees

@@ -89,7 +89,7 @@ def _closure(a: Assessment) -> list[Remark]:
     misfit = _number(a, "across_misfit")
     if misfit is None:
         return []
-    if abs(misfit) > MISFIT:
+    if abs(misfit) > _limit(a):
         cause = "reference current, compass or a fix is wrong, which a slow glider cannot cause"
         return [Remark("data", f"across the heading the track misses by {speed(abs(misfit))}: {cause}")]
     return [
@@ -100,9 +100,14 @@ def _closure(a: Assessment) -> list[Remark]:
     ]
 
 
+def _limit(a: Assessment) -> float:
+    """The misfit (m/s) that few headings in a file cannot explain."""
+    return MISFIT + 2 * (_number(a, "across_sigma") or 0.0)
+
+
 def _along(a: Assessment) -> list[Remark]:
     value, misfit = _number(a, "along_speed"), _number(a, "across_misfit")
-    if value is None or (misfit is not None and abs(misfit) > MISFIT):
+    if value is None or (misfit is not None and abs(misfit) > _limit(a)):
         return []
     return [_speed_remark(a, value, "ground velocity less current gives {} along the heading")]
 
@@ -173,8 +178,8 @@ def _coverage(a: Assessment) -> list[Remark]:
         ),
         ("duration_h", lambda x: x < SHORT_DIVE, "short dive ({:.1f} h): errors of the fixes weigh more"),
         ("unobserved_h", lambda x: x > UNOBSERVED, "{:.1f} h of the dive are missing from the data"),
-        ("drift_h", lambda x: x > DRIFT, "{:.1f} h of surface drift between the fixes"),
         ("fix_gap_minutes", lambda x: x > FIX_GAP, "{:.0f} min between surfacing and fix"),
+        ("drift_h", lambda x: x > DRIFT, "{:.1f} h of surface drift between the fixes"),
     )
     values = ((_number(a, name), worth, words) for name, worth, words in lines)
     return [Remark("data", words.format(x)) for x, worth, words in values if x is not None and worth(x)]

@@ -32,7 +32,8 @@ class Config(Section):
     state: State = Field(default=State(), description="What gliderwatch remembers.")
     defaults: Settings = Field(default=Settings(), description="Settings of all gliders.")
     gliders: dict[GliderName, Glider] = Field(
-        default_factory=dict, description="The gliders to watch, by name (as their folder; any case)."
+        default_factory=dict,
+        description="The gliders to watch, by name (as in the headers of their files; any case).",
     )
     channels: dict[Name, Channel] = Field(default_factory=dict, description="Ways to send messages.")
     recipients: dict[Name, Recipient] = Field(default_factory=dict, description="Who gets what.")

@@ -82,7 +82,7 @@ def step(state: Estimate, dive: Dive, params: GliderParams, digest: str) -> tupl
     t, basis = dive.track.t - state.begun, gains.basis(centres)
     if not learner.flown and dive.current is not None:
         learner = _with_flow(learner, dive.current, phi(dive.track.x[0], t[0], basis))
-    before = learner.flown
+    before = learner
     learner, info = advance(learner, t, dive.track.x, dive.track.heading, basis, gains)
     reference, earlier = _reference(state, dive)
     maxima = update(state.maxima, info.flow_speed_max, hypot(reference.u, reference.v) if reference else 0.0)
@@ -92,11 +92,17 @@ def step(state: Estimate, dive: Dive, params: GliderParams, digest: str) -> tupl
         centres=places,
         maxima=maxima,
         end=dive.end,
-        warm=state.warm + learner.flown - before,
+        warm=state.warm + learner.flown - before.flown,
         current=dive.current or state.current,
         current_t=dive.t_surface if dive.current is not None else state.current_t,
     )
-    return state, _judged(dive, params, digest, info, state, reference, earlier)
+    judged = _judged(dive, params, digest, info, state, reference, earlier)
+    return state, replace(judged, evidence={**judged.evidence, **_past(before)})
+
+
+def _past(learner: AdaptiveState) -> dict[str, float]:
+    """What the learner knew before the dive, once it had learnt anything."""
+    return {"speed_before": learner.speed} if learner.flown else {}
 
 
 def _reference(state: Estimate, dive: Dive) -> tuple[Current | None, bool]:

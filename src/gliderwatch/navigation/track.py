@@ -83,6 +83,7 @@ def evidence(samples: Samples, flight: Flight, track: Track) -> dict[str, float]
     mean, flown = mean_heading(track)
     out = {
         "duration_h": (flight.end - flight.start) / 3600,
+        "fix_gap_minutes": (float(track.t[-1]) - flight.end) / 60,
         "drift_h": (interval - (flight.end - flight.start)) / 3600,
         "ground_speed": float(np.hypot(*track.x[-1])) / interval,
         "heading_steadiness": float(np.hypot(*mean)) * interval / max(flown, 1.0),
