@@ -79,7 +79,7 @@ def status(view: Overview, console: Console) -> None:
     state = "[green]alive[/]" if view.alive else "[bold red]NOT RUNNING[/]"
     console.print(f"gliderwatch is {state} (last sign of life: {silent})")
     table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("glider", "surfaced (UTC)", "lat lon", "flag"):
+    for name in ("glider", "surfaced UTC", "lat lon", "flag"):
         table.add_column(name, no_wrap=True)
     for name in ("speed", "range", "dives"):
         table.add_column(name, justify="right", no_wrap=True)
@@ -110,7 +110,7 @@ def _glider(g: GliderStatus) -> list[str]:
     speeds = f"{a.speed_min:.2f}-{a.speed_max:.2f}"
     return [
         name,
-        utc(a.t_surface).removesuffix(" UTC"),
+        iso(a.t_surface)[2:16].replace("T", " "),
         where,
         flag(a),
         _number(a.speed),
