@@ -1,0 +1,298 @@
+"""Speed and flow together: an extended Kalman filter, one dive a step. Pure.
+
+State: the flow (see `flow`), the speed W that the glider itself believes, and how its real way through the
+water differs from that in the frame of its heading, as parts of W: slip along, side across. With h the
+mean heading vector of a dive and h' that vector turned left, a dive measures
+
+    g = F + W ((1 - s) h - d h')        ground velocity
+    c = F - W (s h + d h')              depth-averaged current, so that g - c = W h
+
+with s = slip of physics + slip, d = side. So W is seen at once, and with it any drag on the whole body. What
+the glider itself does not know (angle of attack, lost wing, wrong compass) is in c as well: it can be
+seen only where the flow lasts while the heading turns. A test for a step (`detection.sequential`)
+looks for it; when it speaks, slip and side are opened by as much as the step is uncertain.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from gliderwatch.detection.sequential import Bank, Step, Update
+from gliderwatch.estimation import flow, hidden
+from gliderwatch.estimation.causes import FASTEST, Cause, Surprises, odds, opened
+from gliderwatch.estimation.flow import FlowParams
+from gliderwatch.estimation.measurement import OWN, SIDE, SLIP, Guess, Linear, drag_slip, measure
+from gliderwatch.estimation.noise import learn_doubt, learn_sea
+from gliderwatch.estimation.observation import Observation, are_apart, observe
+from gliderwatch.model import Array, Dive, Fix, readonly
+
+LOST, TURNED = 0.3, 0.1
+"""Slip and side (parts of W) that a damaged wing may add: by this they are opened where it is hinted at."""
+SLOWEST = 0.02
+"""m/s: own speed about which the filter is linear on a glider that seems to stand still."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointParams:
+    """What is known before any dive.
+
+    ``speed``, ``speed_sigma`` of W (m/s) and ``speed_wander`` its usual change in 3 h; ``slip`` the part of
+    the physical slip that is real (on board some is allowed for: a DAC is 5 to 10 % of W off), with
+    ``slip_sigma`` its standard error as part of W, ``side_sigma`` that of side (rad), ``slip_wander`` the
+    change of both in a day; ``own_noise`` the error of W on a dive as part of it; ``front`` (m/s) by how
+    much the flow may change together with a step; ``alarms_per_month`` of the test for a step.
+    """
+
+    flow: FlowParams = FlowParams()
+    surprises: Surprises = Surprises()
+    speed: float = 0.35
+    speed_sigma: float = 0.2
+    speed_wander: float = 0.015
+    slip: float = 0.75
+    slip_sigma: float = 0.03
+    side_sigma: float = 0.03
+    slip_wander: float = 0.005
+    own_noise: float = 0.02
+    front: float = 0.25
+    alarms_per_month: float = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class JointState:
+    """What is known after a dive.
+
+    ``t`` middle of the last dive (s), ``x`` ((n,)) and ``cov`` ((n, n)) of the state; ``sea`` factor on the
+    variance of the flow's changes and ``doubt`` on that of the measurements, both learnt; ``dives`` used;
+    ``bank`` of the test for a step; ``nis`` and ``dof``, sums of the normalised innovations squared and
+    of their degrees of freedom on usual dives; ``end`` the fix that ended the last dive.
+    """
+
+    t: float
+    x: Array
+    cov: Array
+    sea: float = 1.0
+    doubt: float = 1.0
+    dives: int = 0
+    bank: Bank = field(default_factory=Bank)
+    nis: float = 0.0
+    dof: int = 0
+    end: Fix | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """What is known of a dive when it is over; speeds in m/s, flows (2,) east, north.
+
+    ``speed`` V through the water with its standard error ``sigma``; ``own_speed`` W, and ``own_sigma``, that
+    part of the error of V which is not common to all dives since launch; ``flow`` F with ``flow_cov``;
+    ``slip`` and ``side`` (parts of W) with standard errors.
+    """
+
+    speed: float
+    sigma: float
+    own_speed: float
+    own_sigma: float
+    flow: Array
+    flow_cov: Array
+    slip: tuple[float, float]
+    side: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class JointInfo:
+    """What was found in a dive.
+
+    ``seen`` of it and the ``estimate`` after it; ``single_sigma`` (m/s) how well this dive alone tells W
+    (infinite: not at all); ``across`` what of g - c is across the heading with its standard error (m/s,
+    None: no current); ``cause`` with the ``odds`` of all; ``nis`` of the ``dof`` innovations used; ``loss``
+    and ``turn`` the likeliest steps in slip and side, ``told`` the one that the test speaks of just now.
+    """
+
+    seen: Observation
+    estimate: Estimate
+    single_sigma: float
+    across: tuple[float, float] | None
+    cause: Cause
+    odds: dict[str, float]
+    nis: float
+    dof: int
+    loss: Step | None
+    turn: Step | None
+    told: Step | None
+
+
+def init(params: JointParams, t: float) -> JointState:
+    """The state before any dive, at a time (s)."""
+    own = np.square([params.speed_sigma, params.slip_sigma, params.side_sigma])
+    cov = np.diag(np.concatenate([flow.prior(params.flow), own]))
+    x = np.zeros(len(cov))
+    x[OWN] = params.speed
+    return JointState(t, readonly(x), readonly(cov))
+
+
+def step(
+    state: JointState | None, dive: Dive, params: JointParams, usual: float | None = None, hint: bool = False
+) -> tuple[JointState | None, JointInfo | None]:
+    """The state after one more dive, and what was found in it; a dive without a track changes nothing.
+
+    ``usual`` is the healthy speed through the water (m/s) where it is known; ``hint`` says that something
+    else speaks for a wing that was lost or bent just now.
+    """
+    if dive.track is None or dive.start is None or dive.end is None:
+        return state, None
+    seen = observe(dive)
+    if state is None or (state.end is not None and are_apart(state.end, dive.start)):
+        state = init(params, (seen.start + seen.end) / 2)
+    kept, state = _predicted(state, seen, hint, params)
+    as_expected, as_seen = _measured(state, seen, params, usual)
+    believed = seen.own_speed()
+    chances = odds(as_expected, as_seen, state.cov, believed[0] if believed else None, params.surprises)
+    cause = max(chances, key=lambda each: chances[each])
+    across = _across(state, seen)
+    sea, doubt = _learnt(state, as_seen, cause, across)
+    after, update = _updated(state, as_expected if cause.is_error else as_seen, cause, params)
+    # a step that shows at a turn looks like another flow: let the test see it as if it were none
+    tested = _updated(state, as_seen, Cause.USUAL, params)[1] if cause is Cause.FLOW else update
+    loss, turn, bank = hidden.steps(state.bank, kept, tested, sea, params.front)
+    told = hidden.told(loss, turn, params.alarms_per_month)
+    after = _opened(replace(after, sea=sea, doubt=doubt, bank=bank, end=dive.end), told)
+    info = JointInfo(
+        seen=seen,
+        estimate=_estimate(after, seen, params, usual),
+        single_sigma=believed[1] * math.sqrt(state.doubt) if believed else math.inf,
+        across=across,
+        cause=cause,
+        odds={str(each): chance for each, chance in chances.items()},
+        nis=float(update.innovation @ update.weight @ update.innovation),
+        dof=len(update.innovation),
+        loss=loss,
+        turn=turn,
+        told=told,
+    )
+    return after, info
+
+
+def _predicted(
+    state: JointState, seen: Observation, hint: bool, params: JointParams
+) -> tuple[Array, JointState]:
+    """The diagonal transition to the middle of a dive, and the state there."""
+    t = (seen.start + seen.end) / 2
+    dt = max(t - state.t, 0.0)
+    kept = np.concatenate([flow.transition(dt, params.flow), np.ones(3)])
+    before = flow.mean_flow(state.t, state.t, params.flow) @ state.x[: params.flow.size]
+    added = np.concatenate(
+        [
+            flow.noise(dt, state.sea, flow.crossing(before, seen.ground, dt, params.flow), params.flow),
+            [params.speed_wander**2 * dt / (3 * flow.HOUR)],
+            np.square([params.slip_wander] * 2) * dt / flow.DAY + np.square([LOST, TURNED]) * hint,
+        ]
+    )
+    cov = kept[:, None] * state.cov * kept + np.diag(added)
+    return kept, replace(state, t=t, x=kept * state.x, cov=cov)
+
+
+def _about(state: JointState, seen: Observation) -> float:
+    """The own speed (m/s) about which the filter is linear: as seen on the dive, where that can be."""
+    believed = seen.own_speed()
+    if believed is not None and SLOWEST < believed[0] < FASTEST:
+        return believed[0]
+    return max(float(state.x[OWN]), SLOWEST)
+
+
+def _measured(
+    state: JointState, seen: Observation, params: JointParams, usual: float | None
+) -> tuple[Linear, Linear]:
+    """The measurements of a dive, linear about the own speed that was expected, and about the one seen."""
+    as_expected, as_seen = (
+        measure(seen, state.x, _guess(state, seen, own, params, usual), state.doubt, params.flow)
+        for own in (max(float(state.x[OWN]), SLOWEST), _about(state, seen))
+    )
+    return as_expected, as_seen
+
+
+def _guess(
+    state: JointState, seen: Observation, own: float, params: JointParams, usual: float | None
+) -> Guess:
+    """What is known of slip at an own speed (m/s), but for the state's part."""
+    physical = params.slip * seen.slip
+    drag, sigma = drag_slip(own * (1 - physical - float(state.x[SLIP])), usual)
+    return Guess(own, physical + drag, math.hypot(sigma, math.sqrt(state.doubt) * params.own_noise))
+
+
+def _updated(
+    state: JointState, linear: Linear, cause: Cause, params: JointParams
+) -> tuple[JointState, Update]:
+    """The state after the measurements of a dive, explained by a cause."""
+    if cause is Cause.CURRENT:
+        linear = linear.first(2)  # a current that is wrong is left out, be it as near as it may
+    linear, cov = opened(linear, state.cov, cause, params.surprises.of(cause).size)
+    rows, e = linear.rows, linear.innovation
+    weight = np.asarray(np.linalg.inv(rows @ cov @ rows.T + linear.noise), dtype=np.float64)
+    gain = cov @ rows.T @ weight
+    left = np.eye(len(cov)) - gain @ rows
+    after = left @ cov @ left.T + gain @ linear.noise @ gain.T
+    counts = cause is Cause.USUAL
+    state = replace(
+        state,
+        x=readonly(state.x + gain @ e),
+        cov=readonly((after + after.T) / 2),
+        dives=state.dives + 1,
+        nis=state.nis + counts * float(e @ weight @ e),
+        dof=state.dof + counts * len(e),
+    )
+    return state, Update(rows, gain, weight, e)
+
+
+def _learnt(
+    state: JointState, linear: Linear, cause: Cause, across: tuple[float, float] | None
+) -> tuple[float, float]:
+    """The factors on the flow's changes and on the noise of measurements after one more dive."""
+    at = slice(-2, None)  # the current, else the ground velocity: both show the flow
+    square = None
+    if cause in (Cause.USUAL, Cause.FLOW) and state.dives:
+        rows, e = linear.rows[at], linear.innovation[at]
+        s = rows @ state.cov @ rows.T + linear.noise[at, at]
+        square = float(e @ np.linalg.solve(s, e)) / 2
+    aside = None if cause.is_error or across is None else (across[0] / across[1]) ** 2
+    return learn_sea(state.sea, square, state.dives), learn_doubt(state.doubt, aside, state.dives)
+
+
+def _across(state: JointState, seen: Observation) -> tuple[float, float] | None:
+    found = seen.across(_about(state, seen))
+    return None if found is None else (found[0], found[1] * math.sqrt(state.doubt))
+
+
+def _opened(state: JointState, told: Step | None) -> JointState:
+    """The state moved by a step that was told; the test begins anew.
+
+    Long innovations were cut for the test, so that the step may well be half as large again.
+    """
+    if told is None:
+        return state
+    cov = state.cov + told.cov + np.outer(told.shift, told.shift) / 4
+    return replace(state, x=readonly(state.x + told.shift), cov=readonly(cov), bank=Bank())
+
+
+def _estimate(state: JointState, seen: Observation, params: JointParams, usual: float | None) -> Estimate:
+    """What the state says of the speed and of the flow on a dive."""
+    x, cov, n = state.x, state.cov, params.flow.size
+    own = float(x[OWN])
+    guess = _guess(state, seen, own, params, usual)
+    slip, side = guess.slip + float(x[SLIP]), float(x[SIDE])
+    slope = np.zeros(n + 3)
+    slope[[OWN, SLIP]] = 1 - slip, -own
+    new = max(0.0, float(cov[SLIP, SLIP]) - params.slip_sigma**2)
+    rows = flow.mean_flow(seen.start, seen.end, params.flow)
+    return Estimate(
+        speed=math.hypot(own * (1 - slip), own * side),
+        sigma=math.sqrt(float(slope @ cov @ slope) + (own * guess.slip_sigma) ** 2),
+        own_speed=own,
+        own_sigma=math.sqrt(float(cov[OWN, OWN]) + own**2 * new),
+        flow=readonly(rows @ x[:n]),
+        flow_cov=readonly(rows @ cov[:n, :n] @ rows.T),
+        slip=(slip, math.sqrt(float(cov[SLIP, SLIP]))),
+        side=(side, math.sqrt(float(cov[SIDE, SIDE]))),
+    )

@@ -1,0 +1,170 @@
+"""What one dive measures of speed and flow, and how well. Pure.
+
+Over the interval between its two fixes a glider moves with the ground velocity g = F + V h, where F is the
+mean flow, V the horizontal speed through the water and h the mean of the heading vector (shorter than
+1 where it turned or drifted at the surface). On board it reckons with a speed W of its own, from depth
+rate and pitch, and reports what is left as depth-averaged current: c = g - W h.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from gliderwatch.model import Array, Dive, Fix, readonly
+from gliderwatch.navigation.frame import to_plane
+
+GPS = 5.0
+"""Metres, a component: error of a fix."""
+SURFACE_FLOW = 0.15
+"""m/s, a component: by how much the drift at the surface differs from the flow below."""
+CONTROL = 0.1
+"""rad: how much a glider swings about its course."""
+COMPASS = 0.02
+"""rad: how well the headings in the files are those that the glider reckoned with; mostly declination."""
+UNEVEN = 0.05
+"""Part of the speed by which dives and climbs differ: matters where the heading differs between them too."""
+UNSEEN = 0.5
+"""Usual error of the mean heading vector over hours of which no data have come."""
+REPORTED, PROVISIONAL = 0.006, 0.02
+"""m/s, a component: error of a current as reckoning, corrected and as first published."""
+DRAG_BY_LIFT = 0.02
+"""C_D0 / a of a Slocum: parasite drag by slope of the lift (Merckelbach et al. 2019: 0.15 and 7.5 1/rad)."""
+USUAL_PITCH, FLATTEST, STEEPEST = 0.45, 0.3, 1.0
+"""rad: pitch of a glide where none is reported, and between which pitches the formula for slip is used."""
+NEW_AFTER, CARRIED = 3 * 86400.0, 3.0
+"""Seconds between two dives, or m/s between their fixes, after which sea and glider are unknown again: the
+glider was recovered, or carried faster than any drift."""
+GAP, GAP_IN_CADENCES = 600.0, 2.5
+"""A gap between headings is one where it is longer than this in seconds, and in usual spacings."""
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """The numbers of one dive.
+
+    ``start``, ``end`` (s) of the interval between the fixes; ``ground`` g (m/s, (2,)) with covariance
+    ``ground_cov`` ((2, 2)) but for what is wrong with the heading; ``heading`` h ((2,)) with covariance
+    ``heading_cov`` ((2, 2)); ``current`` c (m/s, (2,), None: not reported) with standard error
+    ``current_sigma`` a component; ``slip`` the part of W that an angle of attack takes, by physics;
+    ``unseen`` the part of the flight within gaps between headings.
+    """
+
+    start: float
+    end: float
+    ground: Array
+    ground_cov: Array
+    heading: Array
+    heading_cov: Array
+    current: Array | None
+    current_sigma: float
+    slip: float
+    unseen: float
+
+    @property
+    def steadiness(self) -> float:
+        """Length of the mean heading vector, 0 to 1."""
+        return float(np.hypot(*self.heading))
+
+    @property
+    def rest(self) -> Array | None:
+        """g - c (m/s, (2,)): the way through the water as the glider believes it."""
+        return None if self.current is None else self.ground - self.current
+
+    def own_speed(self) -> tuple[float, float] | None:
+        """W along the heading and its standard error (m/s); None without a current or a heading."""
+        rest, length = self.rest, self.steadiness
+        if rest is None or length < 0.1:
+            return None
+        along = self.heading / length
+        speed = float(rest @ along) / length
+        return speed, math.sqrt(float(along @ self.rest_cov(speed) @ along)) / length
+
+    def across(self, speed: float) -> tuple[float, float] | None:
+        """What of g - c is across the heading, left positive, and its standard error (m/s) at that W."""
+        rest, length = self.rest, self.steadiness
+        if rest is None or length < 1e-3:
+            return None
+        aside = np.array([-self.heading[1], self.heading[0]]) / length
+        return float(rest @ aside), math.sqrt(float(aside @ self.rest_cov(speed) @ aside))
+
+    def rest_cov(self, speed: float) -> Array:
+        """Covariance of g - c (m2/s2, (2, 2)) at that W."""
+        return np.asarray(self.ground_cov + speed**2 * self.heading_cov + self.current_sigma**2 * np.eye(2))
+
+
+def observe(dive: Dive) -> Observation:
+    """The observation of a dive. Raises ValueError where it has no track."""
+    if dive.track is None:
+        raise ValueError(f"the dive at {dive.t_dive:.0f} has no track: {dive.reason}")
+    track = dive.track
+    dt = np.diff(track.t)
+    interval = float(dt.sum())
+    flying = np.any(track.heading != 0, axis=1)
+    share = dt[flying] / interval
+    flown, vectors = float(share.sum()), track.heading[flying]
+    current = dive.current
+    error = REPORTED if current is None or current.final else PROVISIONAL
+    return Observation(
+        start=float(track.t[0]),
+        end=float(track.t[-1]),
+        ground=readonly(track.x[-1] / interval),
+        ground_cov=readonly((2 * (GPS / interval) ** 2 + ((1 - flown) * SURFACE_FLOW) ** 2) * np.eye(2)),
+        heading=readonly(share @ vectors),
+        heading_cov=readonly(_heading_cov(vectors, share, dive, interval)),
+        current=None if current is None else readonly([current.u, current.v]),
+        current_sigma=math.hypot(error, 2 * GPS / interval),
+        slip=_slip(dive),
+        unseen=_unseen(dt[flying]),
+    )
+
+
+def are_apart(end: Fix, start: Fix) -> bool:
+    """Whether the fix that ended one dive and the one that began the next belong to different deployments.
+
+    >>> are_apart(Fix(0.0, 30.0, -80.0), Fix(3600.0, 30.0, -80.01))
+    False
+    """
+    gap = start.t - end.t
+    moved = float(np.hypot(*to_plane(start.lat, start.lon, end.lat, end.lon)))
+    return gap > NEW_AFTER or moved > CARRIED * max(gap, 600.0)
+
+
+def _heading_cov(vectors: Array, share: Array, dive: Dive, interval: float) -> Array:
+    """Covariance of the mean heading vector: few samples, compass, uneven speed, hours not seen.
+
+    Differences of successive vectors tell how far a glider swings between samples; a steady turn does not
+    count. A vector of the track is the mean of two samples: its differences have half their variance.
+    """
+    if not len(share):
+        return UNSEEN**2 * np.eye(2)
+    flown = float(share.sum())
+    mean = share @ vectors / flown
+    steps = np.diff(vectors, axis=0)
+    swings = 2 * (steps.T @ steps + CONTROL**2 * np.eye(2)) / (len(steps) + 1)
+    aside = np.array([-mean[1], mean[0]])
+    turned = (COMPASS * flown) ** 2 * np.outer(aside, aside)
+    uneven = (UNEVEN * flown) ** 2 * max(0.0, 1 - float(mean @ mean)) / 2
+    missing = UNSEEN * dive.evidence.get("unobserved_h", 0.0) * 3600 / interval
+    return np.asarray(swings * float(share @ share) + turned + (uneven + missing**2) * np.eye(2))
+
+
+def _slip(dive: Dive) -> float:
+    """The part of depth rate over tan(pitch) that is lost to the angle of attack alpha.
+
+    In a steady glide alpha = C_D / (a tan(theta + alpha)) (Merckelbach et al. 2010), and
+    1 - tan(theta) / tan(theta + alpha) = alpha / (sin theta cos theta) to first order.
+    """
+    pitches = [abs(dive.evidence[name]) for name in ("pitch_dive", "pitch_climb") if name in dive.evidence]
+    pitch = sum(pitches) / len(pitches) if pitches else USUAL_PITCH
+    return DRAG_BY_LIFT / math.sin(min(max(pitch, FLATTEST), STEEPEST)) ** 2
+
+
+def _unseen(dt: Array) -> float:
+    """The part of a flight within gaps between headings, of the intervals ``dt`` (s) between them."""
+    if not len(dt):
+        return 1.0
+    gaps = dt > max(GAP, GAP_IN_CADENCES * float(np.median(dt)))
+    return float(dt[gaps].sum() / dt.sum())

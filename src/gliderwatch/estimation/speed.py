@@ -1,0 +1,202 @@
+"""What is normal for a glider, and what a dive says of it: the joint estimator with its tests. Pure.
+
+Flag 2: a measurement is wrong. Flag 1: the glider is slower than normal (or faster than configured), at once
+or by evidence over several dives. No flag: its speed cannot be known from this dive, and why.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import degrees
+from statistics import median
+
+from gliderwatch.detection.consistency import KEPT, Misfit, blame, disagrees, misfit
+from gliderwatch.detection.sequential import cusum, cusum_bound
+from gliderwatch.estimation import joint
+from gliderwatch.estimation.causes import Cause
+from gliderwatch.estimation.joint import JointInfo, JointParams, JointState
+from gliderwatch.estimation.observation import are_apart
+from gliderwatch.estimation.range import Normal, RangeParams, SpeedRange, learn, setting, speed_range
+from gliderwatch.model import Dive, Flag
+
+DIVES_A_MONTH = 240.0
+"""Dives of 3 h in 30 days."""
+DEPARTURE, SLACK = 0.08, 1.0
+"""Part of the usual speed by which a healthy glider's speed varies at least, for the sum of small losses;
+and how many times that does not add to the sum."""
+ROLLED, ROLLS = 0.12, 5
+"""rad: a step of the mean roll that speaks for a lost or bent wing; dives that tell the usual roll, and
+samples that tell the roll of a dive."""
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedParams:
+    """How speed is judged.
+
+    ``low`` and ``high`` (m/s) are the configured normal range; ``learning`` how another is learnt that takes
+    its place (None: not at all). ``confidence`` is by how many standard errors a speed must be outside;
+    ``gate`` (standard errors) and ``least`` (m/s) are of the test across the heading; ``vague`` is the
+    standard error, as part of the usual speed, above which a dive says nothing; ``turned`` (rad) the
+    least error of a compass that is told.
+    """
+
+    joint: JointParams = JointParams()
+    low: float = 0.15
+    high: float = 0.75
+    learning: RangeParams | None = RangeParams()
+    confidence: float = 1.645
+    gate: float = 4.0
+    least: float = 0.05
+    vague: float = 0.3
+    turned: float = 0.15
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedState:
+    """What is known after a dive.
+
+    ``joint`` estimate (None: no dive yet), ``normal`` speeds learnt, ``rolls`` (rad) of the first healthy
+    dives, ``rolled`` dives in a row that roll otherwise, ``slow`` Page's sum of small losses, ``doubted``
+    slow dives in a row that were not believed, ``misfits`` of the last dives.
+    """
+
+    joint: JointState | None = None
+    normal: Normal = Normal()
+    rolls: tuple[float, ...] = ()
+    rolled: int = 0
+    slow: float = 0.0
+    doubted: int = 0
+    misfits: tuple[Misfit, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What a dive says: ``flag`` (None: nothing) with the ``reason`` in words, the ``normal`` range used, and
+    what was found (``info``, None: the dive has no track)."""
+
+    flag: Flag | None
+    reason: str
+    normal: SpeedRange
+    info: JointInfo | None
+
+
+def step(
+    state: SpeedState, dive: Dive, params: SpeedParams, frozen: bool = False
+) -> tuple[SpeedState, Verdict]:
+    """The state after one more dive, and the verdict on it.
+
+    ``frozen``: an incident is open, so that nothing is learnt of what is normal.
+    """
+    if state.joint is not None and state.joint.end is not None and dive.start is not None:
+        state = SpeedState() if are_apart(state.joint.end, dive.start) else state
+    at = setting(dive.evidence)
+    learnt = speed_range(state.normal, at, params.learning) if params.learning else None
+    normal = learnt or SpeedRange(params.low, (params.low + params.high) / 2, params.high, 0)
+    rolled = state.rolled + 1 if _rolls(state, dive) else 0
+    usual = learnt.usual if learnt else None
+    # the first of two dives may have been half over when it happened
+    estimate, info = joint.step(state.joint, dive, params.joint, usual, hint=1 <= rolled <= 2)
+    if info is None:
+        return state, Verdict(None, dive.reason, normal, None)
+    state = replace(state, joint=estimate, rolled=rolled, misfits=_misfits(state, info))
+    flag, reason = _wrong(state, info, params)
+    if flag is None and not reason:
+        state, flag, reason = _slow_or_fast(state, info, normal, params)
+    if flag is Flag.NORMAL and not frozen:
+        state = _learnt(state, dive, info, at, params)
+    return state, Verdict(flag, reason, normal, info)
+
+
+def _misfits(state: SpeedState, info: JointInfo) -> tuple[Misfit, ...]:
+    """The misfits of the last dives with that of one more."""
+    rest = info.seen.rest
+    if rest is None or info.across is None:
+        return state.misfits
+    return (*state.misfits, misfit(rest, info.seen.heading, info.across))[-KEPT:]
+
+
+def _wrong(state: SpeedState, info: JointInfo, params: SpeedParams) -> tuple[Flag | None, str]:
+    """Flag 2 where a measurement is wrong; no flag with a reason where the dive says nothing of the speed."""
+    if info.seen.current is None:
+        return None, "no depth-averaged current"
+    if info.across is not None and disagrees(state.misfits[-1], params.gate, params.least):
+        return Flag.FALSE_ALARM, str(blame(state.misfits, params.gate, params.least))
+    if info.cause is Cause.CURRENT:
+        return Flag.FALSE_ALARM, "the current does not fit those before, the ground velocity does"
+    if info.cause is Cause.GROUND:
+        return (
+            Flag.FALSE_ALARM,
+            "the ground velocity does not fit, the current does: fixes or headings are wrong",
+        )
+    side, sigma = info.estimate.side
+    if abs(side) > max(params.turned, 3 * sigma):
+        return Flag.FALSE_ALARM, f"the compass seems to be off by {degrees(abs(side)):.0f} degrees"
+    return None, ""
+
+
+def _slow_or_fast(
+    state: SpeedState, info: JointInfo, normal: SpeedRange, params: SpeedParams
+) -> tuple[SpeedState, Flag | None, str]:
+    """The flag that the speed gives, and the state with the sum of small losses and the doubts."""
+    if info.single_sigma > params.vague * normal.usual:
+        return state, None, "the speed cannot be known: the glider turned too much"
+    # what is common to all dives is also in a range that was learnt from them
+    sigma = params.confidence * (info.estimate.own_sigma if normal.dives else info.estimate.sigma)
+    if info.estimate.speed + sigma < normal.low:
+        if not state.doubted and _may_have_turned(info, normal):
+            reason = "slow, or it turned while its heading was not seen: the next dive will tell"
+            return replace(state, doubted=1), None, reason
+        return state, Flag.ANOMALY, _how_slow(info, normal, params)
+    state = replace(state, doubted=0)
+    if info.estimate.speed - sigma > normal.high:
+        if normal.dives:
+            return state, Flag.FALSE_ALARM, "faster than ever: the current is wrong, or it is driven harder"
+        return state, Flag.ANOMALY, "faster than normal"
+    return _small_losses(state, info, normal, params)
+
+
+def _may_have_turned(info: JointInfo, normal: SpeedRange) -> bool:
+    """Whether a turn back while no heading was seen explains a slow dive as well."""
+    seen = 1 - 2 * info.seen.unseen
+    return seen <= 0 or info.estimate.speed / seen >= normal.low
+
+
+def _small_losses(
+    state: SpeedState, info: JointInfo, normal: SpeedRange, params: SpeedParams
+) -> tuple[SpeedState, Flag, str]:
+    """Flag 1 where a loss too small for one dive has gone on for several; the state with the sum of it."""
+    if not normal.dives:
+        return state, Flag.NORMAL, ""
+    bound = cusum_bound(SLACK, DIVES_A_MONTH / params.joint.alarms_per_month)
+    total = cusum(state.slow, (1 - info.estimate.speed / normal.usual) / DEPARTURE, SLACK)
+    state = replace(state, slow=min(total, 2 * bound))
+    if total > bound:
+        return state, Flag.ANOMALY, "a little slow for several dives"
+    return state, Flag.NORMAL, ""
+
+
+def _how_slow(info: JointInfo, normal: SpeedRange, params: SpeedParams) -> str:
+    """Words for a speed below normal."""
+    believed = info.estimate.own_speed * (1 - params.joint.slip * info.seen.slip)
+    if believed >= normal.low:
+        return "slower through the water than the glider itself believes: a wing may be lost or bent"
+    return "slower than normal"
+
+
+def _rolls(state: SpeedState, dive: Dive) -> bool:
+    """Whether the roll of a dive differs much from the usual one."""
+    roll = dive.evidence.get("roll_mean")
+    if roll is None or dive.n_samples < ROLLS or len(state.rolls) < ROLLS:
+        return False
+    return abs(roll - median(state.rolls)) > ROLLED
+
+
+def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: SpeedParams) -> SpeedState:
+    """The state with what a normal dive teaches."""
+    roll = dive.evidence.get("roll_mean")
+    if roll is not None and len(state.rolls) < 3 * ROLLS:
+        state = replace(state, rolls=(*state.rolls, roll))
+    if params.learning is None or info.told is not None:
+        return state
+    hours = dive.evidence.get("duration_h", 0.0)
+    return replace(state, normal=learn(state.normal, info.estimate.speed, at, hours, params.learning))

@@ -1,0 +1,81 @@
+import numpy as np
+import pytest
+
+from gliderwatch.estimation.range import Normal, RangeParams, learn, setting, speed_range
+from gliderwatch.model import readonly
+
+PARAMS = RangeParams()
+
+
+def learnt(speeds, at=0.0, normal=None, hours=3.0):
+    normal = normal or Normal()
+    for speed in speeds:
+        normal = learn(normal, speed, at, hours, PARAMS)
+    return normal
+
+
+def test_too_few_dives_tell_nothing():
+    assert speed_range(Normal(), 0.0, PARAMS) is None
+    assert speed_range(learnt([0.25, 0.26]), 0.0, PARAMS) is None
+    assert speed_range(learnt([0.25, 0.26, 0.24]), 0.0, PARAMS).dives == 3
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.005, 0.02, 0.1])
+def test_loss_of_30_percent_is_outside_and_a_usual_dive_within(spread):
+    """However much the speeds scatter, and however little."""
+    rng = np.random.default_rng(3)
+    speeds = 0.25 + spread * np.clip(rng.standard_normal(24), -1.5, 1.5)
+    found = speed_range(learnt(speeds), 0.0, PARAMS)
+    assert 0.7 * found.usual < 0.75 * found.usual <= found.low <= 0.85 * found.usual
+    assert found.high >= 1.349 * found.usual
+    assert found.usual == pytest.approx(np.median(speeds))
+
+
+def test_one_odd_dive_moves_nothing():
+    plain = speed_range(learnt([0.25] * 9), 0.0, PARAMS)
+    odd = speed_range(learnt([0.25] * 8 + [0.6]), 0.0, PARAMS)
+    assert odd.low == plain.low
+
+
+def test_short_dives_after_launch_do_not_count():
+    """maria-2022: dives of a quarter of an hour at 0.39 m/s, then three days at 0.21."""
+    normal = learnt([0.37, 0.39, 0.37, 0.35], hours=0.3)
+    assert len(normal.speeds) == 0
+    assert speed_range(learnt([0.21, 0.2, 0.22], normal=normal), 0.0, PARAMS).usual == 0.21
+
+
+def test_only_the_first_dives_teach():
+    """Slow fouling must not become normal."""
+    normal = learnt([0.25] * PARAMS.most + [0.15] * 200)
+    assert len(normal.speeds) == PARAMS.most
+    assert speed_range(normal, 0.0, PARAMS).usual == 0.25
+
+
+def test_thruster_has_a_range_of_its_own():
+    normal = learnt([0.54] * 5, at=0.14, normal=learnt([0.33] * 5))
+    assert speed_range(normal, 0.0, PARAMS).usual == 0.33
+    assert speed_range(normal, 0.16, PARAMS).usual == 0.54
+
+
+def test_stronger_setting_is_held_against_the_weaker_ones():
+    normal = learnt([0.54] * 5, at=0.14, normal=learnt([0.33] * 5))
+    found = speed_range(normal, 0.5, PARAMS)
+    assert found.low == speed_range(normal, 0.14, PARAMS).low
+    assert found.high == np.inf
+    assert speed_range(learnt([0.54] * 5, at=0.3), 0.0, PARAMS) is None  # a weaker one says nothing
+
+
+def test_drop_to_buoyancy_is_not_held_against_the_thruster():
+    normal = learnt([0.54] * 9, at=0.05)
+    assert speed_range(normal, 0.0, PARAMS) is None
+
+
+def test_setting_without_a_thruster():
+    assert setting({}) == 0.0
+    assert setting({"thruster": 0.4}) == 0.4
+
+
+def test_learning_does_not_change_its_input():
+    normal = Normal(readonly([0.25]), readonly([0.0]))
+    learn(normal, 0.3, 0.0, 3.0, PARAMS)
+    assert len(normal.speeds) == 1

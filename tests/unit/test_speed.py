@@ -1,0 +1,167 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gliderwatch.estimation.range import RangeParams
+from gliderwatch.estimation.speed import SpeedParams, SpeedState, step
+from gliderwatch.model import Fix, Flag, readonly
+from joint_support import DAY, HOUR, LAT, LON, START, Way, mission, ways
+
+PARAMS, NOTHING = SpeedParams(), SpeedState()
+
+
+def run(dives, params=PARAMS, state=NOTHING, **more):
+    out = []
+    for each in dives:
+        state, verdict = step(state, each, params, **more)
+        out.append(verdict)
+    return state, out
+
+
+def flags(verdicts):
+    return [v.flag for v in verdicts]
+
+
+def slower(way, part, hidden=False):
+    return replace(way, speed=(1 - part) * way.speed, own=way.own if hidden else (1 - part) * way.own)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_healthy_mission_has_no_flag(seed):
+    _, verdicts = run(mission(ways(60, seed, lambda k: 0.9 * (k // 4))))
+    assert set(flags(verdicts)) == {Flag.NORMAL}
+    assert verdicts[0].normal.low == PARAMS.low
+    assert verdicts[10].normal.low == pytest.approx(0.85 * 0.23, abs=0.01)
+
+
+def test_range_is_the_configured_one_where_nothing_is_learnt():
+    _, verdicts = run(mission(ways(10, 0, lambda k: 0.5)), replace(PARAMS, learning=None))
+    assert {(v.normal.low, v.normal.high, v.normal.dives) for v in verdicts} == {(0.15, 0.75, 0)}
+
+
+@pytest.mark.parametrize(("part", "within"), [(0.5, 1), (0.3, 2)])
+def test_drag_is_flag_1_at_once(part, within):
+    made = ways(24, 1, lambda k: 0.7 * (k // 5))
+    _, verdicts = run(mission([w if k < 12 else slower(w, part) for k, w in enumerate(made)]))
+    assert flags(verdicts[:12]) == [Flag.NORMAL] * 12
+    assert flags(verdicts[12 + within - 1 :]) == [Flag.ANOMALY] * (13 - within)
+    assert verdicts[14].reason == "slower than normal"
+
+
+def test_small_loss_is_told_after_several_dives():
+    """14 % less: within the range, but not for long."""
+    made = ways(40, 2, lambda k: 0.7 * (k // 5))
+    _, verdicts = run(mission([w if k < 15 else slower(w, 0.14) for k, w in enumerate(made)]))
+    assert verdicts[15].flag is Flag.NORMAL
+    told = flags(verdicts).index(Flag.ANOMALY)
+    assert 16 < told < 32
+    assert verdicts[told].reason == "a little slow for several dives"
+
+
+@pytest.mark.parametrize("angle", [0.2, math.pi / 2, 2.0, math.pi, 4.0])
+def test_wrong_current_is_flag_2_and_never_flag_1(angle):
+    error = (0.3 * math.cos(angle), 0.3 * math.sin(angle))
+    made = ways(24, 3, lambda k: 0.2 * k)
+    _, verdicts = run(mission([w if k < 12 else replace(w, wrong=error) for k, w in enumerate(made)]))
+    assert flags(verdicts[12:]).count(Flag.FALSE_ALARM) >= 11
+    assert Flag.ANOMALY not in flags(verdicts)
+
+
+def test_wrong_current_is_named():
+    made = ways(14, 4, lambda k: 0.3)
+    _, verdicts = run(mission([*made[:-1], replace(made[-1], wrong=(-0.1, 0.3))]))
+    assert verdicts[-1].reason == "the current is wrong"
+
+
+def test_lost_wing_is_told_where_it_rolls_the_glider():
+    made = ways(30, 5, lambda k: 0.3)
+    lost = [w if k < 15 else replace(slower(w, 0.5, hidden=True), roll=0.4) for k, w in enumerate(made)]
+    _, verdicts = run(mission(lost))
+    assert Flag.ANOMALY in flags(verdicts[15:18])
+    assert "wing" in verdicts[-1].reason
+    assert Flag.ANOMALY not in flags(verdicts[:15])
+
+
+def test_roll_alone_is_no_anomaly():
+    made = ways(40, 6, lambda k: 0.9 * (k // 3))
+    _, verdicts = run(mission([w if k < 15 else replace(w, roll=0.4) for k, w in enumerate(made)]))
+    assert Flag.ANOMALY not in flags(verdicts)
+
+
+def test_turned_compass_is_flag_2():
+    made = ways(60, 7, lambda k: 1.6 * (k // 3))
+    _, verdicts = run(mission([w if k < 20 else replace(w, turned=0.9) for k, w in enumerate(made)]))
+    assert Flag.FALSE_ALARM in flags(verdicts[20:])
+    assert any("compass" in v.reason for v in verdicts)
+    assert Flag.ANOMALY not in flags(verdicts)
+
+
+def test_circles_and_missing_currents_have_no_flag_but_a_reason():
+    circle = tuple(np.linspace(0, 2 * math.pi, 24, endpoint=False))
+    _, verdicts = run(mission([*[Way()] * 5, Way(heading=circle), Way(wrong=None)]))
+    assert flags(verdicts[5:]) == [None, None]
+    assert verdicts[5].reason == "the speed cannot be known: the glider turned too much"
+    assert verdicts[6].reason == "no depth-averaged current"
+
+
+def test_dive_without_track_keeps_its_reason():
+    dives = mission([Way()] * 5)
+    state, _ = run(dives[:4])
+    after, verdict = step(state, replace(dives[4], track=None, reason="stale fix"), PARAMS)
+    assert after is state
+    assert (verdict.flag, verdict.reason, verdict.info) == (None, "stale fix", None)
+
+
+def test_slow_dive_with_unseen_headings_waits_for_the_next():
+    """george-2024: the glider turned back in the second half of a dive of which no heading was sent."""
+    made = ways(16, 8, lambda k: 0.3)
+    dives = mission([w if k < 14 else slower(w, 0.5) for k, w in enumerate(made)])
+    for k in (14, 15):
+        track = dives[k].track
+        t = np.concatenate([track.t[:13], track.t[-1:]])
+        x = readonly(track.x[[*range(13), -1]])
+        dives[k] = replace(dives[k], track=replace(track, t=readonly(t), x=x, heading=track.heading[:13]))
+    _, verdicts = run(dives)
+    assert verdicts[14].flag is None
+    assert "turned while its heading was not seen" in verdicts[14].reason
+    assert verdicts[15].flag is Flag.ANOMALY
+
+
+def test_nothing_is_learnt_while_an_incident_is_open():
+    dives = mission([Way()] * 10)
+    state, _ = run(dives[:6])
+    after, _ = run(dives[6:], state=state, frozen=True)
+    assert np.array_equal(after.normal.speeds, state.normal.speeds)
+
+
+def test_thruster_on_is_not_faster_than_ever():
+    sailing = [Way(speed=0.23, own=0.25)] * 8
+    pushed = [Way(speed=0.52, own=0.55, thruster=0.3)] * 8
+    _, verdicts = run(mission([*sailing, *pushed]))
+    assert set(flags(verdicts)) == {Flag.NORMAL}
+    _, unexplained = run(mission([*sailing, *[replace(w, thruster=0.0) for w in pushed]]))
+    assert unexplained[-1].flag is Flag.FALSE_ALARM
+    assert "faster than ever" in unexplained[-1].reason
+
+
+def test_new_deployment_forgets_what_is_normal():
+    state, _ = run(mission([Way()] * 10))
+    dive = mission([Way(speed=0.4, own=0.43)])[0]
+    t = START + 10 * DAY
+    later = replace(
+        dive,
+        start=Fix(t, LAT, LON),
+        end=Fix(t + 3 * HOUR, LAT, LON),
+        track=replace(dive.track, t=readonly(dive.track.t + 10 * DAY)),
+    )
+    after, verdict = step(state, later, PARAMS)
+    assert verdict.flag is Flag.NORMAL
+    assert len(after.normal.speeds) == 1
+
+
+def test_range_can_be_tightened():
+    tight = replace(PARAMS, learning=replace(RangeParams(), narrowest=0.05, widest=0.05))
+    _, verdicts = run(mission([*[Way()] * 8, *[slower(Way(), 0.12)] * 2]), tight)
+    assert verdicts[-1].flag is Flag.ANOMALY
