@@ -188,16 +188,18 @@ class Daemon:
         self._parts.feed()
 
     def _take(self, job: Job) -> None:
-        path, result = Path(job.file.path), job.result
-        if isinstance(result, Segment) and result.id == job.header.id:
+        path, result, glider = Path(job.file.path), job.result, job.header.id.glider
+        if arrivals.state(path) not in (None, (job.file.size, job.file.mtime_ns)):
+            # it has grown, or is another one: what was decoded may be of before or of after
+            self._parts.settling.forget(path)
+            self._observe(path)
+            self._speak(glider)
+        elif isinstance(result, Segment) and result.id == job.header.id:
             self._take_in(job.file, result)
         elif isinstance(result, Exception):
             self._note(arrivals.failed(job.file, result))
-        else:  # it was replaced between header and decoding
-            self._speak(job.header.id.glider)
-        if arrivals.state(path) != (job.file.size, job.file.mtime_ns):  # it has grown, or is another one
-            self._parts.settling.forget(path)
-            self._observe(path)
+        else:  # it was replaced between header and decoding, and has gone since
+            self._speak(glider)
 
     def _take_in(self, file: File, segment: Segment) -> None:
         glider = segment.id.glider
