@@ -65,19 +65,12 @@ class Flown:
 
 
 def navigated(segments: Sequence[Segment]) -> list[Dive]:
-    """The dives that ended, with how much the thruster was on."""
+    """The dives that ended."""
     state, dives = Navigation(), dict[float, Dive]()
     for segment in segments:
         state, told = extend(state, segment)
         dives |= {dive.t_dive: dive for dive in told}
-    thruster = [s.get("thruster_on") for s in segments]
-    t, on = (np.concatenate([getattr(s, name) for s in thruster]) for name in "tv")
-    out = []
-    for dive in (dives[t_dive] for t_dive in sorted(dives)):
-        within = on[(t >= dive.t_dive) & (t <= dive.t_surface)]
-        more = {"thruster": float(within.mean())} if len(within) > 2 else {}
-        out.append(replace(dive, evidence={**dive.evidence, **more}))
-    return [dive for dive in out if dive.end is not None]
+    return [dives[t] for t in sorted(dives) if dives[t].end is not None]
 
 
 def read(folder: Path, cache: Path) -> list[Segment]:
@@ -222,7 +215,13 @@ def slowed(dive: Dive, part: float) -> Dive:
     speed = own[0] if own and 0 < own[0] < 1.3 else dive.evidence.get("onboard_speed", 0.3)
     steps = dive.track.heading * np.diff(dive.track.t)[:, None]
     way = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
-    return replace(dive, track=replace(dive.track, x=readonly(dive.track.x - part * speed * way)))
+    names = ("depth_rate_dive", "depth_rate_climb", "onboard_speed")
+    slower = {name: (1 - part) * dive.evidence[name] for name in names if name in dive.evidence}
+    return replace(
+        dive,
+        track=replace(dive.track, x=readonly(dive.track.x - part * speed * way)),
+        evidence={**dive.evidence, **slower},
+    )
 
 
 def off(dive: Dive, angle: float, size: float = 0.3) -> Dive:

@@ -171,7 +171,7 @@ def _default(key: str, value: Schema, section: Schema) -> str:
     default = value.get("default")
     if isinstance(default, str):
         return f"`{default}`"
-    if default is None or default == []:
+    if default is None or default == [] or isinstance(default, bool):
         return f"`{json.dumps(default)}`"
     return f"`{default:g}`"
 

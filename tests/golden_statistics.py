@@ -41,9 +41,10 @@ def statistics(data: Path, name: str) -> dict[str, Any]:
         "hours_under_water": _round(sum(a.evidence.get("duration_h", 0.0) for a in judged), 1),
         "along_speed": _quantiles([a.evidence["along_speed"] for a in judged if "along_speed" in a.evidence]),
         "across_misfit": _quantiles([abs(x) for x in _of(judged, "across_misfit")]),
-        "speed": _quantiles([a.speed for a in judged]),
+        "speed": _quantiles([a.speed for a in judged if a.speed is not None]),
         "p_e": _quantiles([a.p_e for a in judged if a.p_e is not None]),
-        "clle_max": _quantiles([a.clle_max for a in judged], 1),
+        "speed_sigma": _quantiles(_of(judged, "speed_sigma")),
+        "nis": _quantiles(_of(judged, "nis"), 2),
         "incidents": [f"{i.kind}, {i.dives} dives" for i in store.incidents(glider)],
     }
 

@@ -158,7 +158,10 @@ class Flag(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Assessment:
-    """What gliderwatch says of one dive. Fields: `docs/nomenclature.md`."""
+    """What gliderwatch says of one dive. Fields: `docs/nomenclature.md`.
+
+    ``reason`` says in words why there is no flag, or what a flag other than 0 means here.
+    """
 
     glider: str
     segment: str
@@ -186,6 +189,26 @@ class Assessment:
     parameters: str
 
 
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """The next surfacing, as it is expected after the last one.
+
+    ``after`` the last surfacing and ``t`` the next (s), with its standard error ``t_sigma`` (s); ``lat`` and
+    ``lon`` (degrees) of the next fix, None where the last one is not known, with the covariance ``east``,
+    ``cross``, ``north`` of its east and north components (m2); ``source`` what it rests on, in words.
+    """
+
+    after: float
+    t: float
+    t_sigma: float
+    lat: float | None
+    lon: float | None
+    east: float
+    cross: float
+    north: float
+    source: str
+
+
 class Severity(IntEnum):
     """How loud a message is; recipients choose the least they want."""
 
@@ -202,6 +225,7 @@ class Kind(StrEnum):
     ALL_CLEAR = "all_clear"
     REMINDER = "reminder"
     CORRECTION = "correction"
+    OVERDUE = "overdue"
     SURFACING = "surfacing"
     OPERATOR = "operator"
 

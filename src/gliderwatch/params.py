@@ -13,8 +13,8 @@ from gliderwatch.model import Severity
 
 
 @dataclass(frozen=True, slots=True)
-class EstimatorParams:
-    """Gains and basis functions of Algorithm 1 and the threshold of Algorithm 2 (001; 000 Table I)."""
+class LearnerParams:
+    """Gains and basis functions of Algorithm 1 (001; 000 Table I)."""
 
     kernel: Literal["exponential", "gaussian"] = "exponential"
     sigma: float = 13e3
@@ -31,10 +31,10 @@ class EstimatorParams:
     """Phase of the basis functions (rad)."""
     max_speed: float | None = None
     """Speed at which the glider's through-water speed saturates (m/s); None: it does not."""
+    flow_gain: float = 1 / 3600
+    """Rate (1/s) at which the estimator `composite` draws the learnt flow to the reference."""
     centres: tuple[tuple[float, float], ...] = ()
     """Planned centres (latitude, longitude in degrees); empty: grown along the way."""
-    gamma_f: float = 0.3
-    """Flow error p_E above which a dive gets flag 2."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,5 +72,35 @@ class GliderParams:
 
     speed_min: float = 0.15
     speed_max: float = 0.75
-    estimator: EstimatorParams = field(default_factory=EstimatorParams)
+    speed_learnt: bool = True
+    """Whether a range learnt from the first healthy dives takes the place of the two above."""
+    estimator: Literal["joint", "adaptive", "composite"] = "joint"
+    reference: Literal["dac", "tides", "learnt", "model"] = "dac"
+    """The flow F_M that the estimated one is compared with."""
+    gamma_f: float = 0.3
+    """Flow error p_E above which the flow does not fit (001 Algorithm 2)."""
+    alarms_per_month: float = 0.05
+    """How often evidence over several dives may cry wolf on a healthy glider."""
+    surfacing_hours: float | None = None
+    """Hours from surfacing to surfacing as programmed, until they are learnt; None: not known."""
+    learner: LearnerParams = field(default_factory=LearnerParams)
     rules: RuleParams = field(default_factory=RuleParams)
+
+
+@dataclass(frozen=True, slots=True)
+class Attention:
+    """How a glider's silence is taken, and until when it is not spoken of.
+
+    Apart from `GliderParams`: it changes nothing that is estimated, so it leaves their hash as it is.
+    """
+
+    overdue_hours: float | None = None
+    """Hours past the expected surfacing after which it is overdue; None: as `rules.silence.margin` says."""
+    muted_until: float | None = None
+    """Time (s) until which nothing is told of it."""
+    recovered: bool = False
+    """Whether it is out of the water: nothing is told of it."""
+
+    def is_quiet(self, now: float) -> bool:
+        """Whether nothing is told of it at a time (s)."""
+        return self.recovered or (self.muted_until is not None and now < self.muted_until)

@@ -11,19 +11,28 @@ from dataclasses import dataclass
 
 import msgspec
 
+from gliderwatch.currents.field import Field
 from gliderwatch.estimation.glider import Estimate, step
-from gliderwatch.model import Assessment, Dive, Incident, Segment
+from gliderwatch.estimation.observation import are_apart
+from gliderwatch.forecast.learning import ground
+from gliderwatch.forecast.outlook import look_ahead
+from gliderwatch.forecast.surfacing import Surfacings, expect, learn
+from gliderwatch.forecast.waypoints import Heard, bound_for, heard
+from gliderwatch.model import Assessment, Dive, Expected, Incident, Segment
 from gliderwatch.navigation.dives import Navigation, extend
 from gliderwatch.params import GliderParams
-from gliderwatch.rules.incident import Watches, judge
+from gliderwatch.rules.incident import Watches, ended, judge
 
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """What is known of a glider after a dive: the estimate and the state of the rules."""
+    """What is known of a glider after a dive: the estimate, the state of the rules, how it surfaces, and
+    where and when it comes up next (None: cannot be said yet)."""
 
     estimate: Estimate = Estimate()
     watches: Watches = Watches()
+    surfacings: Surfacings = Surfacings()
+    expected: Expected | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +50,7 @@ class GliderState:
     assessment: Assessment | None = None
     told: tuple[Incident, ...] = ()
     memory: Memory = Memory()
+    waypoints: Heard = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,13 +58,14 @@ class Outcome:
     """What one segment leads to.
 
     ``assessments`` replace all of dives that began at ``since`` (s) or later; ``incidents`` replace all that
-    were opened after it, and the earlier ones of the same id.
+    were opened after it, and the earlier ones of the same id. ``expected`` is the next surfacing.
     """
 
     state: GliderState
     since: float
     assessments: tuple[Assessment, ...]
     incidents: tuple[Incident, ...]
+    expected: Expected | None
 
 
 def digest(params: GliderParams) -> str:
@@ -62,13 +73,19 @@ def digest(params: GliderParams) -> str:
     return hashlib.sha256(msgspec.json.encode(params, order="sorted")).hexdigest()[:12]
 
 
-def process(state: GliderState, segment: Segment, params: GliderParams) -> Outcome:
-    """Advance one glider by one segment; segments must come in the order of their ids."""
+def process(
+    state: GliderState, segment: Segment, params: GliderParams, ocean: Field | None = None
+) -> Outcome:
+    """Advance one glider by one segment; segments must come in the order of their ids.
+
+    ``ocean`` is the field of an ocean model or a radar, where the reference flow is to be taken from one.
+    """
     navigation, dives = extend(state.navigation, segment)
     key = digest(params)
     settled, last, assessment, memory = state.settled, state.last, state.assessment, state.memory
     assessments = {assessment.t_dive: assessment} if assessment is not None else {}
     incidents = {i.id: i for i in settled.watches.open()}
+    waypoints = heard(state.waypoints, segment)
     changed = {i.id: i for i in state.told}
     for dive in dives:
         if dive.end is None:  # not surfaced yet: worth telling, not worth learning from
@@ -78,14 +95,38 @@ def process(state: GliderState, segment: Segment, params: GliderParams) -> Outco
             incidents |= changed
             settled = memory
         last = dive
-        estimate, assessment = step(settled.estimate, dive, params, key)
-        watches, told = judge(settled.watches, assessment, params.rules)
-        memory, changed = Memory(estimate, watches), {i.id: i for i in told}
+        waypoint = bound_for(waypoints, dive.end.t)
+        memory, assessment, told = _after(settled, dive, waypoint, params, key, ocean)
+        changed = {i.id: i for i in told}
         assessments[dive.t_dive] = assessment
     since = state.last.t_dive if state.last is not None else float("-inf")
     return Outcome(
-        GliderState(navigation, settled, last, assessment, tuple(changed.values()), memory),
+        GliderState(navigation, settled, last, assessment, tuple(changed.values()), memory, waypoints),
         since,
         tuple(assessments.values()),
         tuple((incidents | changed).values()),
+        memory.expected,
     )
+
+
+def _after(
+    before: Memory,
+    dive: Dive,
+    waypoint: tuple[float, float] | None,
+    params: GliderParams,
+    key: str,
+    ocean: Field | None,
+) -> tuple[Memory, Assessment, tuple[Incident, ...]]:
+    """The memory after one more dive that ended, what is said of the dive, and the incidents it changed."""
+    over: tuple[Incident, ...] = ()
+    last = before.surfacings.fix
+    if last is not None and dive.start is not None and are_apart(last, dive.start):
+        # another deployment: what was open on the last one is over
+        over, before = ended(before.watches, dive.t_dive), Memory()
+    frozen = bool(before.watches.open())
+    estimate, assessment = step(before.estimate, dive, params, key, frozen, ocean)
+    watches, told = judge(before.watches, assessment, params.rules)
+    surfacings = learn(before.surfacings, dive, waypoint, before.expected)
+    outlook = look_ahead(estimate, ground(dive))
+    expected = None if outlook is None else expect(surfacings, *outlook, params.surfacing_hours)
+    return Memory(estimate, watches, surfacings, expected), assessment, over + told

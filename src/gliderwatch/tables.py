@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from gliderwatch.alerts.words import clean, utc
+from gliderwatch.alerts.words import clean, duration, utc
 from gliderwatch.config import Problem
 from gliderwatch.model import Assessment, Flag, Severity
 from gliderwatch.run.lines import iso
@@ -87,6 +87,9 @@ def status(view: Overview, console: Console) -> None:
         table.add_row(*_glider(glider))
     console.print(table)
     for glider in view.gliders:
+        for style, text in _next(glider):
+            console.print(Text(text, style=style))
+    for glider in view.gliders:
         for i in glider.incidents:
             text = f"{clean(i.glider)}: {i.kind} open since {utc(i.since)}, {i.dives} dives"
             console.print(Text(text, style=_STYLES[i.severity]))
@@ -117,6 +120,26 @@ def _glider(g: GliderStatus) -> list[str]:
         speeds,
         str(g.dives),
     ]
+
+
+def _next(g: GliderStatus) -> list[tuple[str, str]]:
+    """The next surfacing of a glider, or its silence, and why nothing may be told of it: style and text."""
+    name, call, told = clean(g.name, 30), g.awaited, list[tuple[str, str]]()
+    if g.attention.recovered:
+        return [("dim", f"{name}: recovered, nothing is told of it")]
+    if g.is_muted and g.attention.muted_until is not None:
+        told = [("dim", f"{name}: muted until {utc(g.attention.muted_until)}")]
+    if call is None or not g.configured:
+        return told
+    if g.is_over:
+        return [*told, ("dim", f"{name}: last heard {utc(call.heard)}, its deployment seems over")]
+    silent = duration(g.at - call.heard)
+    if g.overdue_since is not None:
+        text = f"{name}: OVERDUE since {utc(g.overdue_since)}, silent for {silent}"
+        return [*told, ("bold red", text)]
+    late = f", {duration(g.at - call.t)} late" if g.at > call.t else ""
+    where = "" if g.place is None else f" near {g.place[0]:.3f} {g.place[1]:.3f}"
+    return [*told, ("yellow" if late else "", f"{name}: next surfacing {utc(call.t)}{where}{late}")]
 
 
 def problems(found: Sequence[Problem], console: Console) -> None:

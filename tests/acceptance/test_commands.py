@@ -169,7 +169,10 @@ def test_status_tells_gliders_and_files(site: Site) -> None:
     assert angus["segments"] == len(files)
     assert angus["latest"]["flag"] == 0
     assert angus["latest"]["t_surface"].endswith("Z")
-    assert bruce == {"configured": True, "segments": 0, "dives": 0, "latest": None, "incidents": []}
+    empty = {"configured": True, "segments": 0, "dives": 0, "latest": None, "incidents": []}
+    silence = dict.fromkeys(("expected", "heard", "overdue_at", "muted_until"))
+    assert bruce == empty | silence | {"overdue": False, "ended": False, "recovered": False}
+    assert angus["ended"] and not angus["overdue"] and angus["expected"]["t"] > angus["latest"]["t_surface"]
     assert f"{angus['latest']['speed']:.2f}" in next(
         line for line in shown.splitlines() if line.startswith("angus")
     )

@@ -1,7 +1,6 @@
 """`gliderwatch simulate`: the tree that it writes, the truth beside it, and playing as time passes."""
 
 import json
-import sys
 import threading
 import time
 from pathlib import Path
@@ -167,16 +166,6 @@ def test_a_folder_with_something_in_it_is_left_alone(out: Path) -> None:
     assert result.exit_code == 2
     assert "is not empty" in result.output
     assert tree(out) == before
-
-
-def test_without_the_package_for_netcdf_it_says_how_to_get_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "netCDF4", None)
-    result = run(tmp_path / "out")
-    assert result.exit_code == 2
-    assert "pip install 'gliderwatch[simulate]'" in result.output
-    assert not (tmp_path / "out").exists()
 
 
 # --------------------------------------------------------------------------- live

@@ -10,12 +10,13 @@ import pytest
 
 from alert_support import SLOW, alert, incident
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.model import Alert, Segment, SegmentId, Series, readonly
+from gliderwatch.model import Alert, Expected, Segment, SegmentId, Series, readonly
 from gliderwatch.params import GliderParams
-from gliderwatch.pipeline import GliderState, Outcome
+from gliderwatch.pipeline import GliderState, Memory, Outcome
 from gliderwatch.rules.announce import Said
+from gliderwatch.rules.silence import Sign
 from gliderwatch.run import intake
-from gliderwatch.store import database
+from gliderwatch.store import codec, database
 from gliderwatch.store.database import SCHEMA, StateError
 from gliderwatch.store.outbox import Outbox
 from gliderwatch.store.sqlite import File, Status, Store
@@ -80,6 +81,28 @@ class TestOpening:
         assert migrated._db.execute("PRAGMA user_version").fetchone()[0] == SCHEMA + 2
         assert migrated._db.execute("SELECT a, b FROM extra").fetchall() == []
         assert migrated.counts() == {Status.TAKEN: 1}
+
+    def test_a_state_file_of_schema_1_is_taken_on(self, path):
+        """As gliderwatch 0.1.0 left it: its segments stay, its states are made anew from them."""
+        path.parent.mkdir()
+        made = mission(LEGS)
+        with sqlite3.connect(path) as db:
+            db.executescript(database.schema() + "PRAGMA user_version = 1;")
+        old = sqlite3.connect(path)
+        for s in made[:-1]:
+            row = (
+                s.id.glider,
+                s.id.opened_at,
+                s.id.name,
+                codec.plain_encode(s.completeness),
+                codec.encode(s),
+            )
+            old.execute("INSERT INTO segments VALUES (?, ?, ?, ?, ?, x'00', 1)", row)
+        old.commit()
+        old.close()
+        store = feed(made[-1:], store=Store.open(path))
+        assert ending(store, "unit") == ending(feed(made), "unit")
+        assert store.expected("unit", 1e12) == feed(made).expected("unit", 1e12)
 
     def test_a_migration_that_fails_changes_nothing(self, store, path, monkeypatch):
         store.close()
@@ -261,16 +284,16 @@ def _dense(s: Segment, rng: np.random.Generator) -> Segment:
 class TestResults:
     def test_new_results_replace_those_from_their_time_on(self, store):
         a = [replace(SLOW, t_dive=100.0 * k, t_surface=100.0 * k + 50) for k in range(4)]
-        store.apply("electa", Outcome(GliderState(), float("-inf"), tuple(a), ()))
+        store.apply("electa", Outcome(GliderState(), float("-inf"), tuple(a), (), None))
         changed = replace(a[2], speed=0.2)
-        store.apply("electa", Outcome(GliderState(), 200.0, (changed,), ()))
+        store.apply("electa", Outcome(GliderState(), 200.0, (changed,), (), None))
         assert store.assessments("electa") == [a[0], a[1], changed]
 
     def test_incidents_opened_later_go(self, store):
         made = [incident(id=f"electa/anomaly/{k}", opened_at=100.0 * k) for k in range(3)]
-        store.apply("electa", Outcome(GliderState(), float("-inf"), (), tuple(made)))
+        store.apply("electa", Outcome(GliderState(), float("-inf"), (), tuple(made), None))
         cleared = replace(made[1], cleared_at=150.0)
-        store.apply("electa", Outcome(GliderState(), 100.0, (), (cleared,)))
+        store.apply("electa", Outcome(GliderState(), 100.0, (), (cleared,), None))
         assert store.incidents("electa") == [made[0], cleared]
 
     def test_a_dive_that_has_not_ended_is_no_surfacing(self, store):
@@ -278,10 +301,48 @@ class TestResults:
         ended = replace(SLOW, t_dive=0.0, t_surface=50.0)
         lost = replace(SLOW, t_dive=100.0, t_surface=150.0, reason="data missing: 1 of 2 h")
         under_way = replace(SLOW, t_dive=200.0, t_surface=250.0, reason="no fix", flag=None)
-        store.apply("electa", Outcome(GliderState(), float("-inf"), (ended, lost, under_way), ()))
+        store.apply("electa", Outcome(GliderState(), float("-inf"), (ended, lost, under_way), (), None))
         assert known.last_surfacing(1e9) == lost
         assert known.last_surfacing(149.0) == ended and known.last_surfacing(0.0) is None
         assert known.dive(200.0) == under_way and known.dive(1.0) is None
+
+
+class TestSurfacings:
+    def expect(self, store: Store, after: float, opened_at: float) -> Expected:
+        made = Expected(after, after + 100.0, opened_at, 30.0, -80.0, 1.0, 0.0, 1.0, "as before")
+        state = GliderState(memory=Memory(expected=made))
+        store.checkpoint(SegmentId(opened_at, "electa", f"electa-{opened_at:g}"), state)
+        return made
+
+    def test_the_last_expected_as_known_at_a_time(self, store):
+        self.expect(store, 200.0, 199.0)
+        first, second = self.expect(store, 100.0, 0.0), self.expect(store, 200.0, 201.0)
+        known = store.known("electa")
+        assert [known.expected(t) for t in (99.0, 199.0, 1e9)] == [None, first, second]
+        assert store.known("other").expected(1e9) is None
+
+    def test_a_segment_that_is_taken_again_leads_to_expect_something_else(self, store):
+        first = self.expect(store, 100.0, 0.0)
+        self.expect(store, 200.0, 110.0)
+        moved = self.expect(store, 190.0, 110.0)
+        assert store.expected("electa", 1e9) == moved
+        store.checkpoint(SegmentId(110.0, "electa", "electa-110"), GliderState())
+        assert store.expected("electa", 1e9) == first
+
+    def test_a_segment_is_heard_once_and_read_later(self, store):
+        identity = SegmentId(100.0, "electa", "electa-1")
+        store.hear(identity, None, 500.0)
+        assert store.signs("electa", 0.0) == (Sign(100.0, None, 500.0),)
+        store.hear(identity, 200.0, 900.0)
+        store.hear(identity, 150.0, 950.0)
+        assert store.signs("electa", 0.0) == (Sign(100.0, 200.0, 500.0),)
+        assert store.signs("electa", 100.1) == () and store.signs("other", 0.0) == ()
+
+    def test_the_first_surfacing_after_a_time(self, store):
+        ended = [replace(SLOW, t_dive=t, t_surface=t + 50) for t in (0.0, 100.0)]
+        under_way = replace(SLOW, t_dive=200.0, t_surface=250.0, reason="no fix", flag=None)
+        store.apply("electa", Outcome(GliderState(), float("-inf"), (*ended, under_way), (), None))
+        assert [store.first_surfacing("electa", t) for t in (0.0, 50.0, 150.0)] == [50.0, 150.0, None]
 
 
 class TestMessages:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from gliderwatch.estimation.glider import Estimate, step
 from gliderwatch.model import Assessment, Incident, Segment
 from gliderwatch.navigation.dives import Navigation, extend
-from gliderwatch.params import AnomalyRule, EstimatorParams, FalseAlarmRule, GliderParams, RuleParams
+from gliderwatch.params import AnomalyRule, FalseAlarmRule, GliderParams, RuleParams
 from gliderwatch.pipeline import digest
 from gliderwatch.rules.incident import Watches, judge
 from gliderwatch.run.intake import Speaking
@@ -21,7 +21,9 @@ from missions import REAL, Ending, Leg, cut, ending, feed, mission, real
 EAGER = GliderParams(
     speed_min=0.25,
     speed_max=0.35,
-    estimator=EstimatorParams(gamma_f=0.15),
+    speed_learnt=False,
+    estimator="adaptive",
+    gamma_f=0.15,
     rules=RuleParams(anomaly=AnomalyRule(open_after=1, clear_after=1), false_alarm=FalseAlarmRule(1, 1)),
 )
 """So easily alarmed that incidents come and go."""
@@ -81,7 +83,7 @@ def in_one_go(segments: list[Segment], params: GliderParams) -> tuple[list[Asses
         dives |= {d.t_dive: d for d in told}
     estimate, watches, assessments, incidents = Estimate(), Watches(), [], {}
     for t in sorted(dives):
-        estimate, assessment = step(estimate, dives[t], params, digest(params))
+        estimate, assessment = step(estimate, dives[t], params, digest(params), bool(watches.open()))
         watches, found = judge(watches, assessment, params.rules)
         assessments.append(assessment)
         incidents |= {i.id: i for i in found}

@@ -12,10 +12,11 @@ import pytest
 
 from gliderwatch.config import Config, load
 from gliderwatch.config.loading import presets_path
-from gliderwatch.config.sections import Anomaly, Estimator, FalseAlarm
+from gliderwatch.config.sections import Adaptive, Anomaly, FalseAlarm
 from gliderwatch.errors import ConfigError
 from gliderwatch.model import Severity
-from gliderwatch.params import AnomalyRule, EstimatorParams, FalseAlarmRule, GliderParams
+from gliderwatch.params import AnomalyRule, Attention, FalseAlarmRule, GliderParams, LearnerParams
+from gliderwatch.pipeline import digest
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "config" / "gliderwatch.yml"
 MINIMAL = "dockserver: {roots: [/data]}\n"
@@ -64,9 +65,9 @@ def test_minimal_file_has_the_documented_defaults(write: Write) -> None:
 
 def test_built_in_gains_are_those_of_franklin_with_a_threshold_that_can_be_exceeded(write: Write) -> None:
     params = load(write(MINIMAL)).glider("electa")
-    estimator = params.estimator
-    assert (estimator.sigma, estimator.k, estimator.gamma) == (13e3, 0.003, 5e-7)
-    assert (estimator.kernel, estimator.gamma_f, estimator.speed_gain) == ("exponential", 0.3, None)
+    learner = params.learner
+    assert (learner.sigma, learner.k, learner.gamma) == (13e3, 0.003, 5e-7)
+    assert (learner.kernel, params.gamma_f, learner.speed_gain) == ("exponential", 0.3, None)
     assert (params.speed_min, params.speed_max) == (0.15, 0.75)
 
 
@@ -134,13 +135,14 @@ LAYERED = (
     + """\
 defaults:
   preset: slow
-  estimator: {k: 0.004, sigma: 2.0e+3}
+  adaptive: {k: 0.004, sigma: 2.0e+3}
   rules: {anomaly: {open_after: 3}}
 gliders:
   plain:
   own:
     normal_speed: {max: 0.4}
-    estimator: {k: 0.005, speed_gain: null, centres: [[27, -83.5]]}
+    estimator: composite
+    adaptive: {k: 0.005, speed_gain: null, centres: [[27, -83.5]]}
     rules: {anomaly: {clear_after: 5}, reminder_hours: null}
   other: {preset: fast, normal_speed: {min: 0.5}}
 """
@@ -148,8 +150,10 @@ gliders:
 TWO_PRESETS = """\
 slow:
   normal_speed: {min: 0.1, max: 0.2}
-  estimator: {k: 0.001, gamma: 1.0e-6, speed_gain: 2.0e-6, gamma_f: 0.5}
-fast: {normal_speed: {min: 0.4, max: 0.9}, estimator: {nu: 1, kernel: gaussian}}
+  estimator: adaptive
+  adaptive: {k: 0.001, gamma: 1.0e-6, speed_gain: 2.0e-6}
+  detection: {gamma_f: 0.5}
+fast: {normal_speed: {min: 0.4, max: 0.9}, adaptive: {nu: 1, kernel: gaussian}}
 """
 
 
@@ -161,25 +165,31 @@ def test_precedence(write: Write, presets: Write) -> None:
 
     # built-in < preset < defaults
     assert (plain.speed_min, plain.speed_max) == (0.1, 0.2)
-    assert plain.estimator == EstimatorParams(sigma=2e3, k=0.004, gamma=1e-6, speed_gain=2e-6, gamma_f=0.5)
+    assert plain.learner == LearnerParams(sigma=2e3, k=0.004, gamma=1e-6, speed_gain=2e-6)
+    assert (plain.estimator, plain.gamma_f, plain.speed_learnt) == ("adaptive", 0.5, False)
     assert plain.rules.anomaly == AnomalyRule(open_after=3)
 
     # < glider, key by key; null is a value
     assert (own.speed_min, own.speed_max) == (0.1, 0.4)
-    assert (own.estimator.k, own.estimator.sigma, own.estimator.gamma) == (0.005, 2e3, 1e-6)
-    assert own.estimator.speed_gain is None
-    assert own.estimator.centres == ((27.0, -83.5),)
+    assert (own.estimator, own.learner.k, own.learner.sigma, own.learner.gamma) == (
+        "composite",
+        0.005,
+        2e3,
+        1e-6,
+    )
+    assert own.learner.speed_gain is None
+    assert own.learner.centres == ((27.0, -83.5),)
     assert own.rules.anomaly == AnomalyRule(open_after=3, clear_after=5)
     assert own.rules.reminder_hours is None
 
     # the glider's preset replaces that of the defaults, whose explicit keys win over either
     assert (other.speed_min, other.speed_max) == (0.5, 0.9)
-    assert other.estimator == EstimatorParams(kernel="gaussian", sigma=2e3, k=0.004, nu=1.0)
+    assert other.learner == LearnerParams(kernel="gaussian", sigma=2e3, k=0.004, nu=1.0)
 
 
 def test_every_parameter_has_its_key() -> None:
     for section, params in (
-        (Estimator, EstimatorParams),
+        (Adaptive, LearnerParams),
         (Anomaly, AnomalyRule),
         (FalseAlarm, FalseAlarmRule),
     ):
@@ -196,9 +206,9 @@ def test_no_presets(write: Write, presets: Write) -> None:
 
 
 def test_a_broken_presets_file_is_named(write: Write, presets: Write) -> None:
-    presets("slow:\n  estimator: {sgma: 3}\n")
+    presets("slow:\n  adaptive: {sgma: 3}\n")
     assert problems(write(MINIMAL)) == [
-        "presets.yml:2: slow.estimator.sgma: unknown key (did you mean `sigma`?)"
+        "presets.yml:2: slow.adaptive.sgma: unknown key (did you mean `sigma`?)"
     ]
 
 
@@ -232,3 +242,42 @@ def test_a_config_made_without_a_file_works() -> None:
     config = Config.model_validate({"dockserver": {"roots": ["/data"]}})
     assert config.glider("electa") == GliderParams()
     assert config.locate("dockserver.roots") == 1
+
+
+# --------------------------------------------------------------------------- silence
+
+
+def test_silence_is_as_the_glider_says_else_as_the_defaults(write: Write) -> None:
+    text = "defaults: {overdue_hours: 5, surfacing_hours: 6}\n"
+    text += "gliders:\n  a: {overdue_hours: 2}\n  b:\n  c: {overdue_hours: }"
+    config = load(write(MINIMAL + text))
+    assert [config.attention(g).overdue_hours for g in "abcd"] == [2, 5, None, 5]
+    assert config.glider("a").surfacing_hours == 6
+    assert load(write(MINIMAL)).attention("a") == Attention()
+
+
+@pytest.mark.parametrize(
+    ("written", "seconds"),
+    [
+        ("2026-12-01", 1796083200),
+        ("2026-12-01 14:30", 1796135400),
+        ("'2026-12-01T14:30Z'", 1796135400),
+        ("2026-12-01T14:30:00+02:00", 1796128200),
+        ("", None),
+    ],
+)
+def test_a_mute_ends_at_a_time_in_utc(write: Write, written: str, seconds: float | None) -> None:
+    config = load(write(MINIMAL + f"gliders: {{A: {{muted_until: {written}}}}}"))
+    assert config.attention("a").muted_until == seconds
+
+
+def test_who_is_quiet_is_estimated_alike(write: Write) -> None:
+    """Nothing of a mute or a recovery goes into the parameters, whose hash each assessment carries."""
+    quiet = "gliders: {a: {muted_until: 2026-12-01, recovered: true, overdue_hours: 2}}"
+    config = load(write(MINIMAL + quiet))
+    assert digest(config.glider("a")) == digest(load(write(MINIMAL)).glider("a"))
+    assert config.attention("a").is_quiet(2e9) and not config.attention("b").is_quiet(0.0)
+
+
+def test_a_mute_is_over_when_it_ends() -> None:
+    assert [Attention(muted_until=100.0).is_quiet(t) for t in (99.9, 100.0)] == [True, False]

@@ -46,9 +46,10 @@ def problems(path: Path) -> list[str]:
         ("gliders: [electa]", "1: gliders: must be a section (`key: value` lines below it)"),
         (
             MINIMAL + "defaults: {zzzz: 1}",
-            "2: defaults.zzzz: unknown key (known are: estimator, normal_speed, preset, rules)",
+            "2: defaults.zzzz: unknown key (known are: adaptive, detection, estimator, normal_speed, "
+            "overdue_hours, preset, reference, rules, surfacing_hours)",
         ),
-        (MINIMAL + "defaults: {paths: [/d]}", "2: defaults.paths: unknown key (known are: estimator"),
+        (MINIMAL + "defaults: {paths: [/d]}", "2: defaults.paths: unknown key (known are: adaptive"),
         (MINIMAL + "stat: {}", "2: stat: unknown key (did you mean `state`?)"),
         (MINIMAL + "state:\n  path:\n  - /d", "3: state.path: must be text (put it in quotes)"),
         (
@@ -71,15 +72,31 @@ def problems(path: Path) -> list[str]:
             MINIMAL.replace("]}", "],\n  settle_seconds: .inf}"),
             "2: dockserver.settle_seconds: must be a finite number",
         ),
-        (MINIMAL + "defaults: {estimator:\n  {sigma: }}", "3: defaults.estimator.sigma: must be a number"),
+        (MINIMAL + "defaults: {adaptive:\n  {sigma: }}", "3: defaults.adaptive.sigma: must be a number"),
         (
-            MINIMAL + "defaults: {estimator:\n  {centres: [[1, 2], [3, 400]]}}",
-            "3: defaults.estimator.centres.1.1: must be less than or equal to 180",
+            MINIMAL + "defaults: {adaptive:\n  {centres: [[1, 2], [3, 400]]}}",
+            "3: defaults.adaptive.centres.1.1: must be less than or equal to 180",
         ),
         (
-            MINIMAL + "defaults:\n  estimator:\n    centres:\n    - [1, 2]\n    - [3]",
-            "6: defaults.estimator.centres.1.1: is missing (write two numbers)",
+            MINIMAL + "defaults:\n  adaptive:\n    centres:\n    - [1, 2]\n    - [3]",
+            "6: defaults.adaptive.centres.1.1: is missing (write two numbers)",
         ),
+        (
+            MINIMAL + "gliders:\n  a:\n    muted_until: soon",
+            "4: gliders.a.muted_until: must be a date (2026-12-01) or a date and time in UTC (2026-12-01",
+        ),
+        (
+            MINIMAL + "gliders: {a: {muted_until: 2026-02-30}}",
+            "2: gliders.a.muted_until: is no date that exists: write 2026-12-01, or 2026-12-01 14:30",
+        ),
+        (MINIMAL + "gliders: {a: {muted_until: 20261201}}", "2: gliders.a.muted_until: must be a date"),
+        (MINIMAL + "gliders: {a: {muted_until: 2026-W01}}", "2: gliders.a.muted_until: must be a date"),
+        (MINIMAL + "gliders: {a: {recovered: 1}}", "2: gliders.a.recovered: must be true or false"),
+        (MINIMAL + "gliders: {a: {recovered: }}", "2: gliders.a.recovered: must be true or false"),
+        (MINIMAL + "defaults: {recovered: true}", "2: defaults.recovered: unknown key"),
+        (MINIMAL + "defaults: {muted_until: 2026-12-01}", "2: defaults.muted_until: unknown key"),
+        (MINIMAL + "gliders: {a: {overdue_hours: 0}}", "2: gliders.a.overdue_hours: must be greater than 0"),
+        (MINIMAL + "defaults: {surfacing_hours: '3'}", "2: defaults.surfacing_hours: must be a number"),
         (
             MINIMAL + "defaults: {rules: {anomaly: {open_after: 1.5}}}",
             "2: defaults.rules.anomaly.open_after: must be a whole number",
@@ -155,7 +172,7 @@ def problems(path: Path) -> list[str]:
         (MINIMAL + "defaults: &d {}\ngliders:\n  a: *d", "4: gliders.a: YAML aliases (`*name`) are not used"),
         (MINIMAL + "state: !x {path: y}", "2: state: YAML tags (`!name`) are not used here"),
         (MINIMAL + "? [a]\n: 1", "2: a key that is not a word"),
-        (MINIMAL + "defaults: {estimator: {k: !!int x}}", "2: defaults.estimator.k: not a number"),
+        (MINIMAL + "defaults: {adaptive: {k: !!int x}}", "2: defaults.adaptive.k: not a number"),
     ],
 )
 def test_mistake_is_named_with_its_line_and_cure(write: Write, text: str, expected: str) -> None:

@@ -1,192 +1,120 @@
-"""The estimator of one glider, dive by dive."""
+"""The estimator that the settings choose, and the reference flow that it is compared with."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from gliderwatch.estimation.glider import DEPLOYMENT_GAP, Estimate, step, warm_up
-from gliderwatch.model import Assessment, Dive, Fix
-from gliderwatch.navigation.dives import Navigation, extend
-from gliderwatch.params import EstimatorParams, GliderParams
-from missions import Leg, mission
+from gliderwatch.currents.field import Field
+from gliderwatch.estimation.glider import Estimate, step
+from gliderwatch.model import Assessment, Dive, readonly
+from gliderwatch.params import GliderParams
+from joint_support import DAY, LAT, LON, START, mission, ways
 
-LEGS = [Leg(heading=0.6 * k, hours=3) for k in range(14)]
-
-
-def dives(legs=LEGS) -> list[Dive]:
-    state, out = Navigation(), {}
-    for s in mission(legs):
-        state, told = extend(state, s)
-        out |= {d.t_dive: d for d in told}
-    return [out[t] for t in sorted(out)]
+STRAIGHT = mission(ways(16, 3, lambda k: 0.4 * k))
 
 
-def run(these: list[Dive], params: GliderParams | None = None) -> tuple[Estimate, list[Assessment]]:
+def told(dives: list[Dive], ocean: Field | None = None, **params: object) -> list[Assessment]:
     state, out = Estimate(), []
-    for dive in these:
-        state, assessment = step(state, dive, params or GliderParams(), "digest")
+    for dive in dives:
+        state, assessment = step(state, dive, replace(GliderParams(), **params), "digest", ocean=ocean)
         out.append(assessment)
-    return state, out
+    return out
 
 
-def test_speed_and_flow_of_a_healthy_glider():
-    _, told = run(dives())
-    for a in told[2:]:
-        assert a.flag == 0 and a.reason == ""
-        assert a.speed == pytest.approx(0.3, abs=0.05)
-        assert (a.flow_u, a.flow_v) == pytest.approx((0.1, -0.05), abs=0.06)
-    assert told[-1].excitation > 0.01 and told[-1].clle_max > 0.0
-
-
-def test_it_warms_up_before_it_judges():
-    _, told = run(dives())
-    assert (told[0].flag, told[0].reason) == (None, "warming up")
-    assert told[0].speed is not None  # what it has so far is shown
-    hours = warm_up(GliderParams()) / 3600
-    judged = [a.reason == "" for a in told]
-    assert judged == [3.0 * (k + 1) >= hours for k in range(len(told))]
-
-
-def test_a_dive_that_cannot_be_used_changes_nothing():
-    good = dives()
-    state, _ = run(good[:5])
-    bad = replace(good[5], track=None, reason="no heading for 3.0 h")
-    after, a = step(state, bad, GliderParams(), "digest")
-    assert after is state
-    assert (a.flag, a.reason, a.speed, a.flow_u) == (None, "no heading for 3.0 h", None, None)
-    assert (a.lat, a.lon) == (good[5].end.lat, good[5].end.lon)
-    assert a.reference_u == pytest.approx(0.1)  # what is known of it is still told
-
-
-def test_inputs_are_not_changed():
-    good = dives()
-    state, _ = run(good[:4])
-    before = [state.learner.xi.tobytes(), state.centres.tobytes(), good[4].track.x.tobytes()]
-    step(state, good[4], GliderParams(), "digest")
-    assert [state.learner.xi.tobytes(), state.centres.tobytes(), good[4].track.x.tobytes()] == before
-
-
-def test_the_first_guess_is_what_the_first_dive_says():
-    state, (a,) = run(dives()[:1])
-    assert a.speed == pytest.approx(0.3, abs=0.01)
-    assert (a.flow_u, a.flow_v) == pytest.approx((0.1, -0.05), abs=0.02)
-    assert state.begun == dives()[0].t_dive
-
-
-def test_without_a_current_the_first_guess_is_the_speed_on_board():
-    first = replace(dives()[0], current=None)
-    _, (a,) = run([replace(first, evidence=dict(first.evidence) | {"onboard_speed": 0.32})])
-    assert a.speed == pytest.approx(0.32, abs=0.05)
-
-
-@pytest.mark.parametrize("absurd", [-0.2, 9.0])
-def test_or_the_middle_of_the_range(absurd):
-    first = replace(dives()[0], current=None)
-    params = GliderParams(speed_min=0.25, speed_max=0.35)
-    for evidence in ({}, {"onboard_speed": absurd}):
-        _, (a,) = run([replace(first, evidence=evidence)], params)
-        assert a.speed == pytest.approx(0.3, abs=0.06)
-
-
-def test_without_any_current_in_the_files_it_judges_and_says_so():
-    _, told = run([replace(d, current=None) for d in dives()])
-    assert told[-1].flag is not None and told[-1].p_e is None
-    assert any("no depth-averaged current in the files" in note for note in told[-1].notes)
-
-
-def test_for_a_current_that_has_not_come_that_of_an_earlier_dive_stands_in():
-    these = dives()
-    these[6] = replace(these[6], current=None)
-    _, told = run(these)
-    assert (told[6].flag, told[6].reference_final) == (0, False)
-    assert told[6].reference_u == pytest.approx(0.1)
-    assert any("that of an earlier dive stands in" in note for note in told[6].notes)
-
-
-def test_but_not_for_long():
-    these = dives()
-    for k in range(6, 12):
-        these[k] = replace(these[k], current=None)
-    _, told = run(these)
-    assert (told[6].flag, told[11].flag, told[11].reason) == (0, None, "no depth-averaged current")
-    assert told[12].flag == 0
-
-
-def test_a_slow_glider_gets_flag_1():
-    """It must fly in many directions: on one course a slower glider and another current are alike."""
-    legs = [*LEGS, *(replace(leg, speed=0.02) for leg in LEGS)]
-    params = GliderParams(speed_min=0.2, speed_max=0.4, estimator=EstimatorParams(gamma_f=1.0))
-    _, told = run(dives(legs), params)
-    assert [a.flag for a in told[2:14]] == [0] * 12
-    assert {a.flag for a in told[20:]} == {1}
-    assert told[-1].speed < 0.1
-
-
-def test_a_wrong_reference_gets_flag_2():
-    these = dives()
-    these[9] = replace(these[9], current=replace(these[9].current, u=-0.4, v=0.5))
-    _, told = run(these)
-    assert [told[8].flag, told[9].flag] == [0, 2]
-    assert told[9].p_e > told[9].gamma_f
-
-
-def test_another_deployment_starts_anew():
-    legs = dives()
-    later = [_moved_in_time(d, DEPLOYMENT_GAP + 5 * 86400) for d in dives()[:2]]
-    state, told = run([*legs, *later])
-    assert state.begun == later[0].t_dive
-    assert told[len(legs)].reason == "warming up"
-
-
-def test_a_glider_that_was_carried_starts_anew():
-    these = dives()
-    far = replace(these[5], start=Fix(these[5].start.t, these[5].start.lat + 1.0, these[5].start.lon))
-    state, told = run([*these[:5], far])
-    assert state.begun == far.t_dive and told[-1].reason == "warming up"
-
-
-def _moved_in_time(dive: Dive, seconds: float) -> Dive:
-    fix = lambda f: Fix(f.t + seconds, f.lat, f.lon)  # noqa: E731
-    return replace(
-        dive,
-        t_dive=dive.t_dive + seconds,
-        t_surface=dive.t_surface + seconds,
-        start=fix(dive.start),
-        end=fix(dive.end),
-        track=replace(dive.track, t=dive.track.t + seconds),
+def field(u: float, v: float, days: float = 4.0) -> Field:
+    """The same current everywhere, around the dives and for some days."""
+    shape = (2, 1, 2, 2)
+    return Field(
+        t=readonly([START - DAY, START + days * DAY]),
+        depth=readonly([]),
+        lat=readonly([LAT - 2, LAT + 2]),
+        lon=readonly([LON - 2, LON + 2]),
+        u=readonly(np.full(shape, u)),
+        v=readonly(np.full(shape, v)),
+        source="model.nc",
+        stale=10 * DAY,
     )
 
 
-def test_functions_cover_the_way_and_the_old_ones_are_let_go():
-    legs = [Leg(heading=1.5, current=(0.5, 0.0), hours=8) for _ in range(16)]
-    params = GliderParams(estimator=EstimatorParams(sigma=5e3))
-    state, told = run(dives(legs), params)
-    length = 16 * 8 * 3600 * 0.8
-    assert 6 <= len(state.centres) < length / 5e3
-    assert state.learner.xi.shape == (2, len(state.centres))
-    assert len(state.learner.gram) == len(state.centres) + 2
-    assert np.isfinite([a.speed for a in told]).all()
+@pytest.mark.parametrize("estimator", ["joint", "adaptive", "composite"])
+def test_each_estimator_finds_a_healthy_glider_healthy(estimator):
+    found = told(STRAIGHT, estimator=estimator)
+    assert {a.flag for a in found[4:]} == {0}
+    assert found[-1].speed == pytest.approx(0.23, abs=0.03)
 
 
-def test_planned_centres_stay_where_they_are():
-    """Also the one that the glider is far from."""
-    planned = ((36.0, -70.0), (37.5, -68.0))
-    params = GliderParams(estimator=EstimatorParams(sigma=15e3, centres=planned))
-    state, told = run(dives(), params)
-    assert state.centres[:2].tolist() == [list(p) for p in planned]
-    assert told[-1].flag == 0
+def test_only_the_estimator_chosen_is_advanced():
+    state = Estimate()
+    for dive in STRAIGHT[:3]:
+        state, _ = step(state, dive, GliderParams(), "digest")
+    assert state.learner == Estimate().learner and state.joint.speed.joint is not None
+    state = Estimate()
+    for dive in STRAIGHT[:3]:
+        state, _ = step(state, dive, GliderParams(estimator="adaptive"), "digest")
+    assert state.joint == Estimate().joint and state.learner.learner is not None
 
 
-def test_the_assessment_says_by_what_it_was_judged():
-    params = GliderParams(speed_min=0.21, speed_max=0.33, estimator=EstimatorParams(gamma_f=0.4))
-    _, told = run(dives()[:1], params)
-    a = told[0]
-    assert (a.speed_min, a.speed_max, a.gamma_f, a.parameters) == (0.21, 0.33, 0.4, "digest")
-    assert a.evidence["along_speed"] == pytest.approx(0.3, abs=1e-3)
+def test_the_uncertainty_of_the_speed_is_told():
+    found = told(STRAIGHT)
+    first, last = (found[k].evidence["speed_sigma"] for k in (0, -1))
+    assert 0.003 < last < first < 0.1
 
 
-def test_a_provisional_current_is_said_to_be():
-    _, told = run(dives())
-    assert not any("provisional" in n for a in told[:-1] for n in a.notes)
-    assert any("provisional" in n for n in told[-1].notes) and not told[-1].reference_final
+def test_another_deployment_begins_with_nothing():
+    moved = [replace(d, t_dive=d.t_dive + 30 * DAY, t_surface=d.t_surface + 30 * DAY) for d in STRAIGHT[:1]]
+    late = replace(
+        moved[0],
+        start=replace(moved[0].start, t=moved[0].start.t + 30 * DAY),
+        end=replace(moved[0].end, t=moved[0].end.t + 30 * DAY),
+        track=replace(moved[0].track, t=readonly(moved[0].track.t + 30 * DAY)),
+    )
+    state = Estimate()
+    for dive in STRAIGHT:
+        state, before = step(state, dive, GliderParams(), "digest")
+    assert "usual_speed" in before.evidence
+    state, after = step(state, late, GliderParams(), "digest")
+    alone = step(Estimate(), late, GliderParams(), "digest")[1]
+    assert after == alone and "usual_speed" not in after.evidence
+
+
+@pytest.mark.parametrize("estimator", ["joint", "adaptive"])
+def test_a_model_that_fits_is_told_of_and_flags_nothing(estimator):
+    flow = np.mean([[d.current.u, d.current.v] for d in STRAIGHT], axis=0)
+    found = told(STRAIGHT, field(*flow), estimator=estimator, reference="model")
+    assert {a.flag for a in found[4:]} == {0}
+    assert (found[5].reference_u, found[5].reference_v) == pytest.approx(tuple(flow))
+    assert "reference flow: model.nc" in found[5].notes[-1]
+
+
+def test_a_model_that_does_not_fit_is_flag_2():
+    found = told(STRAIGHT, field(-0.6, 0.5), reference="model")
+    assert {a.flag for a in found} == {2}
+    assert {a.reason for a in found} == {"the flow does not fit the reference"}
+
+
+def test_a_model_that_says_nothing_is_a_note_and_no_flag():
+    for ocean in (None, field(0.0, 0.0, days=-0.5)):
+        found = told(STRAIGHT, replace(ocean, stale=1.0) if ocean else None, reference="model")
+        assert {a.flag for a in found} == {0}
+        assert all(a.reference_u is None and a.p_e is None for a in found)
+        assert all(a.notes[-1].startswith("no reference flow: ") for a in found)
+
+
+@pytest.mark.parametrize("reference", ["tides", "learnt"])
+@pytest.mark.parametrize("estimator", ["joint", "adaptive", "composite"])
+def test_a_forecast_as_the_reference(estimator, reference):
+    found = told(STRAIGHT, estimator=estimator, reference=reference)
+    assert found[0].reference_u is None and "no reference flow" in found[0].notes[-1]
+    misses = [
+        np.hypot(a.reference_u - d.current.u, a.reference_v - d.current.v)
+        for a, d in zip(found[4:], STRAIGHT[4:], strict=True)
+    ]
+    assert np.median(misses) < 0.1
+    assert not any(a.reference_u == d.current.u for a, d in zip(found[1:], STRAIGHT[1:], strict=True))
+
+
+def test_a_slow_glider_stays_an_anomaly_whatever_the_model_says():
+    slow = mission(ways(10, 3, lambda k: 0.4 * k) + ways(4, 3, lambda k: 0.4 * k, speed=0.1, own=0.11))
+    found = told(slow, field(-0.6, 0.5), reference="model", speed_min=0.18, speed_max=0.3, speed_learnt=False)
+    assert {a.flag for a in found[-3:]} == {1}

@@ -10,11 +10,24 @@ from pathlib import Path
 
 import pytest
 
+from gliderwatch.estimation import baseline
 from gliderwatch.estimation.adaptive import AdaptiveParams
+from gliderwatch.estimation.causes import Surprise, Surprises
+from gliderwatch.estimation.flow import FlowParams, Tide
+from gliderwatch.estimation.joint import JointParams
+from gliderwatch.estimation.range import RangeParams
+from gliderwatch.estimation.speed import SpeedParams
 from gliderwatch.ingest.decode import decode
 from gliderwatch.ingest.segment import QUANTITIES
-from gliderwatch.model import Assessment
-from gliderwatch.params import AnomalyRule, EstimatorParams, FalseAlarmRule, GliderParams, RuleParams
+from gliderwatch.model import Assessment, Expected
+from gliderwatch.params import (
+    AnomalyRule,
+    Attention,
+    FalseAlarmRule,
+    GliderParams,
+    LearnerParams,
+    RuleParams,
+)
 from gliderwatch.pipeline import GliderState, process
 from gliderwatch.simulate.dockserver import write_mission
 from gliderwatch.simulate.glider import simulate
@@ -22,7 +35,10 @@ from gliderwatch.simulate.scenario import Scenario
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "nomenclature.md"
-NAVIGATION = ROOT / "src" / "gliderwatch" / "navigation"
+SOURCE = ROOT / "src" / "gliderwatch"
+SETTINGS = (GliderParams, LearnerParams, RuleParams, AnomalyRule, FalseAlarmRule, Attention, AdaptiveParams)
+JOINT = (SpeedParams, JointParams, FlowParams, Tide, Surprises, Surprise, RangeParams)
+ENDS = ("_low", "_usual", "_high")
 
 
 def tables(heading: str) -> list[list[str]]:
@@ -63,16 +79,37 @@ def test_fields_of_an_assessment() -> None:
     assert named("Assessment") == [field.name for field in fields(Assessment)]
 
 
+def test_fields_of_the_next_surfacing() -> None:
+    assert named("Next surfacing") == [field.name for field in fields(Expected)]
+
+
 def test_parameters() -> None:
-    kinds = (GliderParams, EstimatorParams, RuleParams, AnomalyRule, FalseAlarmRule, AdaptiveParams)
     assert named("Parameters") == [
-        f"{kind.__name__}.{field.name}" for kind in kinds for field in fields(kind)
+        f"{kind.__name__}.{field.name}" for kind in (*SETTINGS, *JOINT) for field in fields(kind)
     ]
 
 
+def test_values_of_the_joint_estimator() -> None:
+    shown = {row[0].strip("`"): row[2] for row in tables("Parameters")}
+    compared = 0
+    for kind in JOINT:
+        for field in fields(kind):
+            value = shown[f"{kind.__name__}.{field.name}"]
+            if re.fullmatch(r"[0-9.]+", value):
+                assert float(value) == field.default, f"{kind.__name__}.{field.name}"
+                compared += 1
+    assert compared > 25
+    flow, surprises = FlowParams(), Surprises()
+    assert shown["Tide.period"] == " and ".join(f"{tide.period:.0f}" for tide in flow.tides)
+    assert shown["Tide.amplitude"] == " and ".join(f"{tide.amplitude:g}" for tide in flow.tides)
+    each = [getattr(surprises, field.name) for field in fields(Surprises)]
+    assert shown["Surprise.chance"] == ", ".join(f"{surprise.chance:g}" for surprise in each)
+    assert shown["Surprise.size"] == ", ".join(f"{surprise.size:g}" for surprise in each)
+
+
 def keys_in_code() -> set[str]:
-    """Names under which navigation and the estimate put numbers into dictionaries, read from the source."""
-    paths = [*NAVIGATION.glob("*.py"), NAVIGATION.parent / "estimation" / "glider.py"]
+    """Names under which navigation and estimators put numbers into dictionaries, read from the source."""
+    paths = [path for folder in ("navigation", "estimation") for path in (SOURCE / folder).glob("*.py")]
     trees = [ast.parse(path.read_text(encoding="utf-8")) for path in paths]
     functions = [
         node
@@ -107,11 +144,26 @@ def test_keys_of_evidence() -> None:
     assert set(named("Evidence")) == keys_in_code()
 
 
-def test_keys_of_evidence_of_a_simulated_mission(tmp_path: Path) -> None:
-    state, emitted = GliderState(), set[str]()
-    for path in write_mission(tmp_path / "gliders", tmp_path / "cache", simulate(Scenario(days=0.5))):
-        outcome = process(state, decode(path, [tmp_path / "cache"]), GliderParams())
+def with_usual() -> list[str]:
+    """The keys that may come with `ENDS`, as the page lists them."""
+    text = PAGE.read_text(encoding="utf-8")
+    found = re.search(r"\*\*What is usual\.\*\*.*?They are (.*?)\. ", text, re.DOTALL)
+    assert found is not None
+    return re.findall(r"`(\w+)`", found[1])
+
+
+def test_keys_with_what_is_usual() -> None:
+    assert with_usual() == [quantity.name for quantity in baseline.QUANTITIES]
+
+
+@pytest.mark.parametrize("estimator", ["joint", "adaptive"])
+def test_keys_of_evidence_of_a_simulated_mission(estimator: str, tmp_path: Path) -> None:
+    state, emitted, params = GliderState(), set[str](), GliderParams(estimator=estimator)  # type: ignore[arg-type]
+    for path in write_mission(tmp_path / "gliders", tmp_path / "cache", simulate(Scenario(days=1.5))):
+        outcome = process(state, decode(path, [tmp_path / "cache"]), params)
         state = outcome.state
         emitted |= {key for a in outcome.assessments for key in a.evidence}
-    assert {"along_speed", "depth_rate_climb", "duration_h"} <= emitted
-    assert emitted <= set(named("Evidence"))
+    own = {"joint": "speed_sigma", "adaptive": "speed_before"}[estimator]
+    assert {"along_speed", "depth_rate_climb", "duration_h", "roll_mean_usual", own} <= emitted
+    usual = {f"{name}{end}" for name in with_usual() for end in ENDS}
+    assert emitted - usual <= set(named("Evidence"))

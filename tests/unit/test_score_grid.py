@@ -64,7 +64,7 @@ def test_no_such_grid():
 def test_an_unknown_estimator_is_refused_with_the_known_ones():
     assert check("adaptive:franklin") in known()
     with pytest.raises(
-        GliderwatchError, match=r"no estimator adaptve; known are: adaptive, adaptive:franklin"
+        GliderwatchError, match=r"no estimator adaptve; known are: joint, composite, adaptive, adaptive:franklin"
     ):
         check("adaptve")
 
@@ -72,7 +72,7 @@ def test_an_unknown_estimator_is_refused_with_the_known_ones():
 def test_an_estimator_is_settings_of_a_pilot():
     params = configuration("adaptive:usf-stella", "sim", 0.2, 0.3).glider("sim")
     assert (params.speed_min, params.speed_max) == (0.2, 0.3)
-    assert (params.estimator.gamma, params.estimator.gamma_f) == (1e-7, 1.0)
+    assert (params.learner.gamma, params.gamma_f) == (1e-7, 1.0)
 
 
 def test_a_key_changes_with_all_that_a_result_depends_on(monkeypatch):

@@ -2,7 +2,8 @@
 
 A remark points to one of three things: the ``glider`` (it really flies out of its range), the
 ``data`` (fix, compass, reference flow or sampling may mislead), or ``normal`` flight. For flag 1 the
-first speaks for it and the others against; for flag 2 it is the other way round.
+first speaks for it and the others against; for flag 2 it is the other way round. Numbers are held
+against what is usual for this glider where that is known (`alerts.usual`), else against fixed bounds.
 """
 
 from __future__ import annotations
@@ -12,8 +13,9 @@ from dataclasses import dataclass
 from math import degrees, hypot
 from typing import Literal
 
+from gliderwatch.alerts.usual import has_usual, usual
 from gliderwatch.alerts.words import angle, clean, known, speed, utc
-from gliderwatch.model import Assessment, Incident, Kind
+from gliderwatch.model import Assessment, Flag, Incident, Kind
 
 # Bounds above (or below) which a number is worth a line; they change no flag.
 MISFIT = 0.05  # m/s across the heading; a few mm/s to 2 cm/s when fixes, compass and current agree
@@ -25,38 +27,46 @@ SHORT_DIVE = 1.0  # h
 DRIFT = 0.5  # h
 FIX_GAP = 15.0  # min
 UNOBSERVED = 0.1  # h
+SURE = 4.0  # standard errors beyond which a misfit is one
+STRONG, USUAL, MINOR = 3.0, 0.5, 0.2  # weights of what decides, is as usual, is good to know; others: 1
+LINES = 6  # on each side, for a phone
 
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """One sentence and what it points to."""
+    """One sentence, what it points to, and how telling it is."""
 
     points_to: Literal["glider", "data", "normal"]
     text: str
+    weight: float = 1.0
 
 
 def weigh(assessment: Assessment, kind: Kind) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """What speaks for and what against an incident of `kind`, from one dive."""
-    remarks = [
-        remark
-        for rule in (
-            _agreement,
-            _closure,
-            _along,
-            _onboard,
-            _before,
-            _roll,
-            _pitch,
-            _rates,
-            _reference,
-            _coverage,
-        )
-        for remark in rule(assessment)
-    ]
-    remarks += [Remark("data", f"data: {clean(note)}") for note in assessment.notes]
-    glider = tuple(r.text for r in remarks if r.points_to == "glider")
-    other = tuple(r.text for r in remarks if r.points_to != "glider")
+    """What speaks for and what against an incident of `kind`, from one dive: the most telling first."""
+    found = sorted(remarks(assessment), key=lambda remark: -remark.weight)
+    glider = tuple(r.text for r in found if r.points_to == "glider")[:LINES]
+    other = tuple(r.text for r in found if r.points_to != "glider")[:LINES]
     return (other, glider) if kind is Kind.FALSE_ALARM else (glider, other)
+
+
+def remarks(assessment: Assessment) -> list[Remark]:
+    """All that can be said of one dive."""
+    rules = (
+        _verdict,
+        _agreement,
+        _closure,
+        _along,
+        _onboard,
+        _before,
+        _usual,
+        _roll,
+        _pitch,
+        _rates,
+        _reference,
+        _coverage,
+    )
+    notes = [Remark("data", f"data: {clean(note)}", MINOR) for note in assessment.notes]
+    return [remark for rule in rules for remark in rule(assessment)] + notes
 
 
 def out_of_range(assessment: Assessment, value: float | None) -> bool:
@@ -76,13 +86,32 @@ def _number(assessment: Assessment, name: str) -> float | None:
     return known(assessment.evidence.get(name))
 
 
+def _verdict(a: Assessment) -> list[Remark]:
+    """What the estimator itself says of a flagged dive."""
+    side: dict[int | None, Literal["glider", "data"]] = {Flag.ANOMALY: "glider", Flag.FALSE_ALARM: "data"}
+    if not a.reason or a.flag not in side:
+        return []
+    return [Remark(side[a.flag], clean(a.reason), 2 * STRONG)]
+
+
+def _usual(a: Assessment) -> list[Remark]:
+    """Numbers against what is usual for this glider."""
+    return [
+        Remark("glider", told.text, min(told.departure, STRONG) + 1)
+        if told.telling
+        else Remark("normal", told.text, USUAL if told.departure <= 1 else 1.0)
+        for told in usual(a.evidence)
+    ]
+
+
 def _agreement(a: Assessment) -> list[Remark]:
     p_e, apart = known(a.p_e), difference(a)
     if p_e is None or apart is None:
         return []
     agree = p_e <= a.gamma_f
     words = f"learnt flow and reference {'agree' if agree else 'disagree'}: {speed(apart)} apart"
-    return [Remark("glider" if agree else "data", f"{words}, p_E {p_e:.3f} (limit {a.gamma_f:.3f})")]
+    weight = 1.0 if agree else STRONG
+    return [Remark("glider" if agree else "data", f"{words}, p_E {p_e:.3f} (limit {a.gamma_f:.3f})", weight)]
 
 
 def _closure(a: Assessment) -> list[Remark]:
@@ -91,18 +120,15 @@ def _closure(a: Assessment) -> list[Remark]:
         return []
     if abs(misfit) > _limit(a):
         cause = "reference current, compass or a fix is wrong, which a slow glider cannot cause"
-        return [Remark("data", f"across the heading the track misses by {speed(abs(misfit))}: {cause}")]
-    return [
-        Remark(
-            "glider",
-            f"fixes, compass and current fit together: {speed(abs(misfit))} misfit across the heading",
-        )
-    ]
+        words = f"across the heading the track misses by {speed(abs(misfit))}: {cause}"
+        return [Remark("data", words, STRONG)]
+    words = f"fixes, compass and current fit together: {speed(abs(misfit))} misfit across the heading"
+    return [Remark("glider", words, MINOR)]
 
 
 def _limit(a: Assessment) -> float:
-    """The misfit (m/s) that few headings in a file cannot explain."""
-    return MISFIT + 2 * (_number(a, "across_sigma") or 0.0)
+    """The misfit (m/s) that chance does not explain."""
+    return max(MISFIT, SURE * (_number(a, "across_sigma") or 0.0))
 
 
 def _along(a: Assessment) -> list[Remark]:
@@ -119,8 +145,8 @@ def _onboard(a: Assessment) -> list[Remark]:
 
 def _speed_remark(a: Assessment, value: float, words: str) -> Remark:
     if out_of_range(a, value):
-        return Remark("glider", f"{words.format(speed(value))}, out of the normal range")
-    return Remark("normal", f"{words.format(speed(value))}, within the normal range")
+        return Remark("glider", f"{words.format(speed(value))}, out of the normal range", STRONG)
+    return Remark("normal", f"{words.format(speed(value))}, within the normal range", STRONG)
 
 
 def _before(a: Assessment) -> list[Remark]:
@@ -134,7 +160,7 @@ def _before(a: Assessment) -> list[Remark]:
 
 def _roll(a: Assessment) -> list[Remark]:
     roll = _number(a, "roll_mean")
-    if roll is None or abs(degrees(roll)) <= ROLL:
+    if roll is None or abs(degrees(roll)) <= ROLL or has_usual(a.evidence, "roll_mean"):
         return []
     return [
         Remark("glider", f"mean roll {angle(roll)}, more than {ROLL:.0f}: a lost wing or a load on one side")
@@ -143,14 +169,16 @@ def _roll(a: Assessment) -> list[Remark]:
 
 def _pitch(a: Assessment) -> list[Remark]:
     down, up = _number(a, "pitch_dive"), _number(a, "pitch_climb")
-    if down is None or up is None or abs(degrees(abs(down) - abs(up))) <= PITCH_DIFFERENCE:
+    if has_usual(a.evidence, "pitch_asymmetry") or down is None or up is None:
+        return []
+    if abs(degrees(abs(down) - abs(up))) <= PITCH_DIFFERENCE:
         return []
     return [Remark("glider", f"pitch differs between dive ({angle(down)}) and climb ({angle(up)})")]
 
 
 def _rates(a: Assessment) -> list[Remark]:
     down, up = _number(a, "depth_rate_dive"), _number(a, "depth_rate_climb")
-    if not down or not up:
+    if not down or not up or has_usual(a.evidence, "rate_ratio"):
         return []
     down, up = abs(down), abs(up)
     if max(down, up) / min(down, up) <= RATE_RATIO:
@@ -189,6 +217,9 @@ def how_sure(assessment: Assessment, dives: int) -> str:
     """What the result rests on, in numbers; `dives` are the flagged ones in a row (0: not told)."""
     a = assessment
     parts = []
+    value, sigma = known(a.speed), _number(a, "speed_sigma")
+    if value is not None and sigma is not None:
+        parts.append(f"{value:.2f} ± {sigma:.2f} m/s")
     if dives:
         parts.append("first flagged dive" if dives == 1 else f"{dives} flagged dives in a row")
     if known(a.reference_u) is not None:

@@ -179,10 +179,12 @@ def flag_words(assessment: Assessment, *, short: bool = False) -> str:
         return f"not assessed ({reason})" if reason else "not assessed"
     words = {
         Flag.NORMAL: ("normal", ""),
-        Flag.ANOMALY: ("anomaly", ": speed out of its normal range"),
-        Flag.FALSE_ALARM: ("false alarm", ": flow and reference disagree"),
+        Flag.ANOMALY: ("anomaly", "speed out of its normal range"),
+        Flag.FALSE_ALARM: ("false alarm", "flow and reference disagree"),
     }[Flag(assessment.flag)]
-    return words[0] if short else "".join(words)
+    if short or assessment.flag == Flag.NORMAL:
+        return words[0]
+    return f"{words[0]}: {clean(assessment.reason, 100) or words[1]}"
 
 
 def _alert(
@@ -241,15 +243,15 @@ def _headline(kind: Kind, a: Assessment) -> str:
     value = known(a.speed)
     if kind is Kind.FALSE_ALARM:
         apart, p_e = difference(a), known(a.p_e)
-        size = "" if apart is None else f" by {speed(apart)}"
-        limit = "" if p_e is None else f" (p_E {p_e:.3f}, limit {a.gamma_f:.3f})"
-        return (
-            f"{_glider(a)}: the flow learnt from its track and the reference flow disagree{size}{limit}. "
-            f"The reference, a fix or the compass is wrong: its speed of {_speed(a)} cannot be trusted."
-        )
+        size = ""
+        if apart is not None and p_e is not None and p_e > a.gamma_f:
+            size = f" by {speed(apart)} (p_E {p_e:.3f}, limit {a.gamma_f:.3f})"
+        why = clean(a.reason, 100) or "flow and reference disagree"
+        return f"{_glider(a)}: {why}{size}. Its speed of {_speed(a)} cannot be trusted."
     sentence = f"{_glider(a)} flies at {_speed(a)} through the water"
     if value is None or not out_of_range(a, value):
-        return f"{sentence}, {_normal(a)} m/s."
+        why = clean(a.reason, 100) if a.flag == Flag.ANOMALY else ""
+        return f"{sentence}, {_normal(a)} m/s" + (f": {why}." if why else ".")
     bound, word = (a.speed_max, "highest") if value > a.speed_max else (a.speed_min, "lowest")
     share = f"{int(100 * max(value, 0.0) / bound)} % of" if bound > 0 else "against"
     return f"{sentence}: {share} its {word} normal speed of {speed(bound)}."

@@ -5,18 +5,22 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
 from gliderwatch.config import references
-from gliderwatch.config.paths import FROM_GLIDER, expand, glider_folders, is_folder
+from gliderwatch.config.paths import FROM_GLIDER, expand, is_folder
 from gliderwatch.config.problem import Problem
 from gliderwatch.config.root import Config
 from gliderwatch.errors import ConfigError
+from gliderwatch.ingest.scan import IGNORED
 
 _CACHES = {".cac", ".ccc"}
 _FREE_BYTES = 200e6
+_DEEPEST = 6
+"""Folders between a root and `from-glider`, as many as the scan goes through."""
+_NOT_OURS = {*IGNORED, "lost+found"}
 _LET_READ = "chmod or setfacl, or add this user to the group of the folder"
 
 
@@ -86,18 +90,42 @@ def _roots(config: Config) -> _Findings:
             yield _error(key, f"{folder} is the folder of one glider", f"give {folder.parent}")
 
 
-def _found(config: Config) -> dict[str, list[Path]]:
-    """From-glider folders below the roots, by glider."""
-    found: dict[str, list[Path]] = {}
+@dataclass(slots=True)
+class _Found:
+    """From-glider folders below the roots, by glider, and folders on the way to them that are closed."""
+
+    gliders: dict[str, list[Path]] = field(default_factory=dict)
+    closed: list[Path] = field(default_factory=list)
+
+    def search(self, folder: Path, depth: int = 0) -> None:
+        """Look as the scan does: at any depth up to its limit, not in archives, and not through links."""
+        try:
+            with os.scandir(folder) as entries:
+                inside = sorted(e.name for e in entries if e.is_dir(follow_symlinks=False))
+        except OSError:
+            self.closed.append(folder)
+            return
+        if FROM_GLIDER in inside:
+            self.gliders.setdefault(folder.name.lower(), []).append(folder / FROM_GLIDER)
+        elif depth < _DEEPEST:
+            for name in inside:
+                if name.lower() not in _NOT_OURS:
+                    self.search(folder / name, depth + 1)
+
+
+def _found(config: Config) -> _Found:
+    found = _Found()
     for _, root in _folders("dockserver.roots", config.dockserver.roots):
         if _can_read(root):
-            for name, folder in glider_folders(root):
-                found.setdefault(name, []).append(folder)
+            found.search(root)
     return found
 
 
 def _gliders(config: Config) -> _Findings:
-    found = _found(config)
+    search = _found(config)
+    found = search.gliders
+    for folder in search.closed:
+        yield _warning("dockserver.roots", f"{folder} cannot be read: nothing below it is watched", _LET_READ)
     if not config.gliders:
         yield _warning("gliders", "no glider is configured: none is watched", "add their names")
     for name, glider in config.gliders.items():

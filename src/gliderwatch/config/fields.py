@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from datetime import UTC, datetime
 from typing import Annotated
 
 from pydantic import (
@@ -31,11 +33,33 @@ def _quieter(severity: Severity) -> Severity:
     return severity
 
 
+_MOMENT = r"^\d{4}-\d\d-\d\d([T ]\d\d:\d\d(:\d\d)?(Z|[+-]\d\d:\d\d)?)?$"
+
+
+def _moment(value: object) -> object:
+    """A date or a date with time as seconds since 1970; without a zone it is UTC."""
+    if not isinstance(value, str) or not re.fullmatch(_MOMENT, value, re.ASCII):
+        raise ValueError("must be a date (2026-12-01) or a date and time in UTC (2026-12-01 14:30)")
+    try:
+        moment = datetime.fromisoformat(value)
+    except ValueError:
+        raise ValueError(
+            "is no date that exists: write 2026-12-01, or 2026-12-01 14:30 for a time in UTC"
+        ) from None
+    return (moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)).timestamp()
+
+
 def _url(value: object) -> object:
     if isinstance(value, dict):
         if set(value) != {"file"} or not isinstance(value["file"], str):
             raise ValueError("must be a URL or {file: PATH}")
         return f"${{file:{value['file']}}}"
+    return value
+
+
+def _switch(value: object) -> object:
+    if not isinstance(value, bool):
+        raise ValueError("must be true or false")
     return value
 
 
@@ -47,6 +71,7 @@ def _references(value: SecretStr) -> SecretStr:
 # Strict: quoted numbers and `true` for 1 are mistakes. Bounds only refuse what cannot be meant.
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Count = Annotated[int, Field(strict=True, ge=1, le=100)]
+Switch = Annotated[bool, BeforeValidator(_switch)]
 Speed = Annotated[Number, Field(ge=0, le=5)]
 AbsolutePath = Annotated[str, StringConstraints(min_length=1), AfterValidator(absolute)]
 GliderName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", to_lower=True)]
@@ -58,6 +83,11 @@ Loudness = Annotated[
     WithJsonSchema({"enum": ["info", "warning", "critical"]}),
 ]
 Quieter = Annotated[Loudness, AfterValidator(_quieter), WithJsonSchema({"enum": ["info", "warning"]})]
+Moment = Annotated[
+    float,
+    BeforeValidator(_moment),
+    WithJsonSchema({"type": "string", "pattern": _MOMENT}),
+]
 Url = Annotated[
     SecretStr,
     BeforeValidator(_url),

@@ -15,6 +15,7 @@ from gliderwatch.config.sections import (
     Channel,
     Dockserver,
     Glider,
+    Ocean,
     Preset,
     Recipient,
     Section,
@@ -22,13 +23,17 @@ from gliderwatch.config.sections import (
     State,
 )
 from gliderwatch.errors import ConfigError
-from gliderwatch.params import GliderParams
+from gliderwatch.params import Attention, GliderParams
+
+_OF_ONE = {"preset", *(Glider.model_fields.keys() - Settings.model_fields.keys())}
+"""Keys that are not laid over those of `defaults`."""
 
 
 class Config(Section):
     """The whole file. Made by `gliderwatch.config.load`."""
 
     dockserver: Dockserver = Field(description="Where files arrive.")
+    ocean: Ocean = Field(default=Ocean(), description="An ocean model, for `reference: model`.")
     state: State = Field(default=State(), description="What gliderwatch remembers.")
     defaults: Settings = Field(default=Settings(), description="Settings of all gliders.")
     gliders: dict[GliderName, Glider] = Field(
@@ -43,6 +48,11 @@ class Config(Section):
     def glider(self, name: str) -> GliderParams:
         """Parameters of a glider: built-in < preset < defaults < its own; defaults for an unknown one."""
         return self._resolve(self.gliders.get(name.lower(), Glider()))
+
+    def attention(self, name: str) -> Attention:
+        """How the silence of a glider is taken."""
+        glider = self.gliders.get(name.lower(), Glider())
+        return Attention(self._settings(glider).overdue_hours, glider.muted_until, glider.recovered)
 
     def defaults_params(self) -> GliderParams:
         """Parameters of a glider that has no settings of its own."""
@@ -76,11 +86,14 @@ class Config(Section):
         return SecretStr(url)
 
     def _resolve(self, glider: Glider) -> GliderParams:
+        return self._settings(glider).params()
+
+    def _settings(self, glider: Glider) -> Settings:
         preset = self._presets.get(glider.preset or self.defaults.preset or "", Preset())
         merged: dict[str, Any] = {}
         for layer in (preset, self.defaults, glider):
-            _merge(merged, layer.model_dump(exclude_unset=True, exclude={"preset", "paths"}))
-        return Settings.model_validate(merged).params()
+            _merge(merged, layer.model_dump(exclude_unset=True, exclude=_OF_ONE))
+        return Settings.model_validate(merged)
 
 
 def _merge(into: dict[str, Any], layer: Mapping[str, Any]) -> None:

@@ -5,26 +5,30 @@ Their docstrings and descriptions make `docs/configuration.md`.
 
 from __future__ import annotations
 
+from ipaddress import ip_address
 from typing import Annotated, Any, Literal, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, IPvAnyAddress, model_validator
 
 from gliderwatch.config.fields import (
     AbsolutePath,
     Count,
     GliderName,
     Loudness,
+    Moment,
     Name,
     Number,
     Quieter,
     Speed,
+    Switch,
     Url,
 )
+from gliderwatch.currents.field import STALE
 from gliderwatch.model import Severity
-from gliderwatch.params import AnomalyRule, EstimatorParams, FalseAlarmRule, GliderParams, RuleParams
+from gliderwatch.params import AnomalyRule, FalseAlarmRule, GliderParams, LearnerParams, RuleParams
 
 _G = GliderParams()
-_E, _R = _G.estimator, _G.rules
+_E, _R = _G.learner, _G.rules
 
 
 def _may_be_empty(schema: dict[str, Any]) -> None:
@@ -66,10 +70,29 @@ class NormalSpeed(Section):
 
     min: Speed = Field(default=_G.speed_min, description="Lower bound (m/s).")
     max: Speed = Field(default=_G.speed_max, description="Upper bound (m/s).")
+    learn: bool | None = Field(
+        default=None,
+        description="Whether the range is learnt from the first healthy dives of a mission; the bounds hold "
+        "until then. null: only where no bound is given.",
+    )
 
 
-class Estimator(Section):
-    """Gains and basis functions of the trajectory learner, and the threshold of its flow test."""
+class Detection(Section):
+    """How easily a dive is flagged."""
+
+    gamma_f: Annotated[Number, Field(ge=0, le=1)] = Field(
+        default=_G.gamma_f,
+        description="Flow error p_E (0 to 1) above which `adaptive` and `composite` give flag 2, and any "
+        "estimator where the reference is not the DAC; 1: never.",
+    )
+    alarms_per_month: Annotated[Number, Field(gt=0, le=30)] = Field(
+        default=_G.alarms_per_month,
+        description="False alarms in a month of a healthy glider that evidence over several dives may give.",
+    )
+
+
+class Adaptive(Section):
+    """Gains and basis functions of the trajectory learner (estimators `adaptive` and `composite`)."""
 
     kernel: Literal["exponential", "gaussian"] = Field(
         default=_E.kernel,
@@ -94,8 +117,9 @@ class Estimator(Section):
     nu: Annotated[Number, Field(ge=-6.3, le=6.3)] = Field(
         default=_E.nu, description="Phase of the basis functions (rad)."
     )
-    gamma_f: Annotated[Number, Field(ge=0, le=1)] = Field(
-        default=_E.gamma_f, description="Flow error (0 to 1) above which a dive is flag 2; 1: never."
+    flow_gain: Annotated[Number, Field(gt=0, le=0.1)] = Field(
+        default=_E.flow_gain,
+        description="Rate (1/s) at which `composite` draws the learnt flow to the reference.",
     )
     max_speed: Annotated[Number, Field(gt=0, le=5)] | None = Field(
         default=_E.max_speed, description="Speed (m/s) at which the estimate saturates; null: it does not."
@@ -153,11 +177,32 @@ class Preset(Section):
     """Settings of one published deployment (`config/presets.yml`)."""
 
     normal_speed: NormalSpeed = Field(default=NormalSpeed(), description="Normal speeds.")
-    estimator: Estimator = Field(default=Estimator(), description="Estimator.")
+    estimator: Literal["joint", "adaptive", "composite"] = Field(
+        default=_G.estimator,
+        description="`joint`: speed, flow and their uncertainty from fixes, headings and currents; "
+        "`adaptive`: the trajectory learner of the papers; `composite`: the same, drawn to the reference.",
+    )
+    reference: Literal["dac", "tides", "learnt", "model"] = Field(
+        default=_G.reference,
+        description="The flow that the estimated one is compared with: the glider's own depth-averaged "
+        "current, its forecast with tides, the flow learnt on the dives before, or `ocean.files`.",
+    )
+    detection: Detection = Field(default=Detection(), description="Detection.")
+    adaptive: Adaptive = Field(default=Adaptive(), description="The trajectory learner.")
 
 
 class Settings(Preset):
     """What holds for every glider that does not say otherwise."""
+
+    surfacing_hours: Annotated[Number, Field(gt=0, le=240)] | None = Field(
+        default=_G.surfacing_hours,
+        description="Hours from surfacing to surfacing as programmed, until learnt; null: not known.",
+    )
+    overdue_hours: Annotated[Number, Field(gt=0, le=720)] | None = Field(
+        default=None,
+        description="Hours past the expected surfacing after which a silent glider is overdue; null: 40 min "
+        "and the longest of 3 h, one interval between surfacings, 3 standard errors of the expected time.",
+    )
 
     preset: str | None = Field(default=None, description="Name of a preset; keys given here win over it.")
     rules: Rules = Field(default=Rules(), description="When to alert.")
@@ -165,10 +210,17 @@ class Settings(Preset):
     def params(self) -> GliderParams:
         """As the values that the pipeline takes."""
         anomaly, false_alarm = self.rules.anomaly, self.rules.false_alarm
+        speed = self.normal_speed
         return GliderParams(
-            speed_min=self.normal_speed.min,
-            speed_max=self.normal_speed.max,
-            estimator=EstimatorParams(**dict(self.estimator)),
+            speed_min=speed.min,
+            speed_max=speed.max,
+            speed_learnt=not {"min", "max"} & speed.model_fields_set if speed.learn is None else speed.learn,
+            estimator=self.estimator,
+            reference=self.reference,
+            gamma_f=self.detection.gamma_f,
+            alarms_per_month=self.detection.alarms_per_month,
+            surfacing_hours=self.surfacing_hours,
+            learner=LearnerParams(**dict(self.adaptive)),
             rules=RuleParams(
                 AnomalyRule(**dict(anomaly)), FalseAlarmRule(**dict(false_alarm)), self.rules.reminder_hours
             ),
@@ -181,6 +233,14 @@ class Glider(Settings):
     paths: tuple[AbsolutePath, ...] = Field(
         default=(),
         description="From-glider folders that lie outside of the roots. Relative to this file.",
+    )
+    muted_until: Moment | None = Field(
+        default=None,
+        description="Nothing is told of it until then; it is assessed all the same. A date (`2026-12-01`: "
+        "from 00:00 UTC on it is told of again) or a date and time in UTC (`2026-12-01 14:30`).",
+    )
+    recovered: Switch = Field(
+        default=False, description="It is out of the water: nothing is told of it, its silence least of all."
     )
 
 
@@ -206,12 +266,90 @@ class Dockserver(Section):
     )
 
 
+class Area(Section):
+    """A part of the earth (degrees north and east); `west` may be greater than `east` (the date line)."""
+
+    south: Annotated[Number, Field(ge=-90, le=90)] = Field(description="Southern edge.")
+    north: Annotated[Number, Field(ge=-90, le=90)] = Field(description="Northern edge.")
+    west: Annotated[Number, Field(ge=-180, le=360)] = Field(description="Western edge.")
+    east: Annotated[Number, Field(ge=-180, le=360)] = Field(description="Eastern edge.")
+
+
+class Ocean(Section):
+    """Files of an ocean model or a radar (CF NetCDF), for gliders with `reference: model`."""
+
+    files: tuple[AbsolutePath, ...] = Field(
+        default=(), description="Paths or patterns (`/data/hycom/*.nc`); read again when they change."
+    )
+    area: Area | None = Field(default=None, description="The part to read; null: all of the files.")
+    stale_hours: Annotated[Number, Field(gt=0, le=8760)] = Field(
+        default=STALE / 3600, description="Hours beyond the last time of the files until which it is used."
+    )
+
+
 class State(Section):
     """What gliderwatch remembers."""
 
     path: AbsolutePath = Field(
         default="/var/lib/gliderwatch/state.sqlite",
         description="The state file; its folder must be writable.",
+    )
+
+
+class Heartbeat(Section):
+    """A sign of life for a dead man's switch: given while all parts of the service work, and only then."""
+
+    url: Url | None = Field(
+        default=None,
+        description="http(s) URL that is fetched. Any part may be a reference, as in the URL of a channel.",
+    )
+    file: AbsolutePath | None = Field(default=None, description="File that is touched; made if need be.")
+    minutes: Annotated[Number, Field(gt=0, le=1440)] = Field(
+        default=5.0, description="Time between two signs of life (min)."
+    )
+
+
+class Metrics(Section):
+    """Numbers for Prometheus. Nothing listens unless a port is given."""
+
+    port: Annotated[int, Field(strict=True, ge=1, le=65535)] | None = Field(
+        default=None, description="TCP port that serves them, such as 9464; null: none."
+    )
+    address: IPvAnyAddress = Field(
+        default=ip_address("127.0.0.1"), description="Address of this machine that the port is on."
+    )
+    open_to_network: Annotated[bool, Field(strict=True)] = Field(
+        default=False,
+        description="Whether `address` may be another than loopback. Whoever reaches the port can read "
+        "names and times of all gliders, without a password.",
+    )
+
+    @model_validator(mode="after")
+    def _stays_at_home(self) -> Metrics:
+        if not self.address.is_loopback and not self.open_to_network:
+            raise ValueError(
+                "address is not loopback: other machines could read it. Write 127.0.0.1, or add "
+                "`open_to_network: true`"
+            )
+        return self
+
+
+class Operator(Section):
+    """When those who run gliderwatch are told that the watch itself is in trouble."""
+
+    silent_hours: Annotated[Number, Field(gt=0, le=8760)] | None = Field(
+        default=24.0, description="Hours without a file of any glider; null: never told."
+    )
+    quarantined_per_day: Annotated[int, Field(strict=True, ge=1, le=100_000)] | None = Field(
+        default=20, description="More files than so many quarantined within 24 h; null: never told."
+    )
+    channel_hours: Annotated[Number, Field(gt=0, le=720)] | None = Field(
+        default=1.0,
+        description="Hours that a channel has not delivered a message, told by the others; null: never told.",
+    )
+    free_mb: Annotated[Number, Field(gt=0, le=1e9)] | None = Field(
+        default=500.0,
+        description="Less free in the folder of the state file than this (MB); null: never told.",
     )
 
 
@@ -234,4 +372,9 @@ class Recipient(Section):
     )
     surfacing: tuple[GliderName, ...] = Field(
         default=(), description="Gliders of which they get one short message at each surfacing."
+    )
+    operator: Annotated[bool, Field(strict=True)] = Field(
+        default=False,
+        description="Whether they get the messages about the watch itself, whatever `min_severity` and "
+        "`gliders` say. Where no recipient has it, all get those of their `min_severity`.",
     )

@@ -15,6 +15,7 @@ import numpy as np
 
 from gliderwatch.estimation.flow import LASTING
 from gliderwatch.estimation.measurement import OWN, Linear
+from gliderwatch.estimation.reckoned import Reckoned
 from gliderwatch.model import Array
 
 FASTEST = 1.3
@@ -79,8 +80,22 @@ def opened(linear: Linear, cov: Array, cause: Cause, size: float) -> tuple[Linea
     return Linear(linear.rows, linear.innovation, linear.noise + np.diag(wrong)), cov + np.diag(more)
 
 
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What is known of W beside the measurements: as the glider ``tells`` it, at the predicted state ``x``
+    ((n,))."""
+
+    tells: Reckoned
+    x: Array
+
+
 def odds(
-    expected: Linear, actual: Linear, cov: Array, own: float | None, surprises: Surprises
+    expected: Linear,
+    actual: Linear,
+    cov: Array,
+    own: float | None,
+    surprises: Surprises,
+    told: Told | None = None,
 ) -> dict[Cause, float]:
     """Probability of each cause.
 
@@ -95,16 +110,34 @@ def odds(
         if cause is Cause.SPEED and own is not None and not 0 < own < FASTEST:
             continue
         surprise = surprises.of(cause)
-        likelihood = _log_density(expected if cause.is_error else actual, cov, cause, surprise.size)
+        linear = expected if cause.is_error else actual
+        likelihood = max(_log_densities(linear, cov, cause, surprise.size, told))
         logs[cause] = math.log(surprise.chance) + likelihood
     most = max(logs.values())
     total = sum(math.exp(each - most) for each in logs.values())
     return {cause: math.exp(each - most) / total for cause, each in logs.items()}
 
 
-def _log_density(linear: Linear, cov: Array, cause: Cause, size: float) -> float:
-    """Log density of the innovation, but for a constant, if that is the cause."""
+def is_believed(linear: Linear, cov: Array, cause: Cause, size: float, told: Told) -> bool:
+    """Whether W as the glider tells it fits a dive that has that cause."""
+    without, with_it = _log_densities(linear, cov, cause, size, told)
+    return with_it > without
+
+
+def _log_densities(
+    linear: Linear, cov: Array, cause: Cause, size: float, told: Told | None
+) -> tuple[float, float]:
+    """Log density of the innovation, but for a constant, if that is the cause: what the glider tells of W
+    being wrong, and being right (minus infinity: it tells nothing)."""
     linear, cov = opened(linear, cov, cause, size)
+    plain = _log_density(linear, cov)
+    if told is None:
+        return plain, -math.inf
+    wrong = plain + math.log(told.tells.lies / FASTEST) + math.log(math.sqrt(2 * math.pi))
+    return wrong, _log_density(linear.with_own(told.x, told.tells), cov) + math.log(1 - told.tells.lies)
+
+
+def _log_density(linear: Linear, cov: Array) -> float:
     s = linear.rows @ cov @ linear.rows.T + linear.noise
     square = float(linear.innovation @ np.linalg.solve(s, linear.innovation))
     return -0.5 * (square + float(np.linalg.slogdet(s)[1]))

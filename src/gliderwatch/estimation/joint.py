@@ -22,11 +22,12 @@ import numpy as np
 
 from gliderwatch.detection.sequential import Bank, Step, Update
 from gliderwatch.estimation import flow, hidden
-from gliderwatch.estimation.causes import FASTEST, Cause, Surprises, odds, opened
+from gliderwatch.estimation.causes import FASTEST, Cause, Surprises, Told, is_believed, odds, opened
 from gliderwatch.estimation.flow import FlowParams
 from gliderwatch.estimation.measurement import OWN, SIDE, SLIP, Guess, Linear, drag_slip, measure
 from gliderwatch.estimation.noise import learn_doubt, learn_sea
 from gliderwatch.estimation.observation import Observation, are_apart, observe
+from gliderwatch.estimation.reckoned import Reckoned
 from gliderwatch.model import Array, Dive, Fix, readonly
 
 LOST, TURNED = 0.3, 0.1
@@ -52,7 +53,7 @@ class JointParams:
     speed_sigma: float = 0.2
     speed_wander: float = 0.015
     slip: float = 0.75
-    slip_sigma: float = 0.03
+    slip_sigma: float = 0.025
     side_sigma: float = 0.03
     slip_wander: float = 0.005
     own_noise: float = 0.02
@@ -107,7 +108,8 @@ class JointInfo:
 
     ``seen`` of it and the ``estimate`` after it; ``single_sigma`` (m/s) how well this dive alone tells W
     (infinite: not at all); ``across`` what of g - c is across the heading with its standard error (m/s,
-    None: no current); ``cause`` with the ``odds`` of all; ``nis`` of the ``dof`` innovations used; ``loss``
+    None: no current); ``cause`` with the ``odds`` of all; ``believes``: W as the glider tells it was told and
+    fits; ``nis`` of the ``dof`` innovations used; ``loss``
     and ``turn`` the likeliest steps in slip and side, ``told`` the one that the test speaks of just now.
     """
 
@@ -117,6 +119,7 @@ class JointInfo:
     across: tuple[float, float] | None
     cause: Cause
     odds: dict[str, float]
+    believes: bool
     nis: float
     dof: int
     loss: Step | None
@@ -134,12 +137,18 @@ def init(params: JointParams, t: float) -> JointState:
 
 
 def step(
-    state: JointState | None, dive: Dive, params: JointParams, usual: float | None = None, hint: bool = False
+    state: JointState | None,
+    dive: Dive,
+    params: JointParams,
+    usual: float | None = None,
+    hint: bool = False,
+    tells: Reckoned | None = None,
 ) -> tuple[JointState | None, JointInfo | None]:
     """The state after one more dive, and what was found in it; a dive without a track changes nothing.
 
     ``usual`` is the healthy speed through the water (m/s) where it is known; ``hint`` says that something
-    else speaks for a wing that was lost or bent just now.
+    else speaks for a wing that was lost or bent just now; ``tells`` is W as the glider tells it
+    beside the current.
     """
     if dive.track is None or dive.start is None or dive.end is None:
         return state, None
@@ -149,13 +158,17 @@ def step(
     kept, state = _predicted(state, seen, hint, params)
     as_expected, as_seen = _measured(state, seen, params, usual)
     believed = seen.own_speed()
-    chances = odds(as_expected, as_seen, state.cov, believed[0] if believed else None, params.surprises)
+    told_own = None if tells is None else Told(tells, state.x)
+    chances = odds(
+        as_expected, as_seen, state.cov, believed[0] if believed else None, params.surprises, told_own
+    )
     cause = max(chances, key=lambda each: chances[each])
     across = _across(state, seen)
     sea, doubt = _learnt(state, as_seen, cause, across)
-    after, update = _updated(state, as_expected if cause.is_error else as_seen, cause, params)
+    linear = as_expected if cause.is_error else as_seen
+    after, update, believes = _updated(state, linear, cause, params, told_own)
     # a step that shows at a turn looks like another flow: let the test see it as if it were none
-    tested = _updated(state, as_seen, Cause.USUAL, params)[1] if cause is Cause.FLOW else update
+    tested = _updated(state, as_seen, Cause.USUAL, params, told_own)[1] if cause is Cause.FLOW else update
     loss, turn, bank = hidden.steps(state.bank, kept, tested, sea, params.front)
     told = hidden.told(loss, turn, params.alarms_per_month)
     after = _opened(replace(after, sea=sea, doubt=doubt, bank=bank, end=dive.end), told)
@@ -166,6 +179,7 @@ def step(
         across=across,
         cause=cause,
         odds={str(each): chance for each, chance in chances.items()},
+        believes=believes,
         nis=float(update.innovation @ update.weight @ update.innovation),
         dof=len(update.innovation),
         loss=loss,
@@ -223,12 +237,16 @@ def _guess(
 
 
 def _updated(
-    state: JointState, linear: Linear, cause: Cause, params: JointParams
-) -> tuple[JointState, Update]:
-    """The state after the measurements of a dive, explained by a cause."""
+    state: JointState, linear: Linear, cause: Cause, params: JointParams, told: Told | None
+) -> tuple[JointState, Update, bool]:
+    """The state after the measurements of a dive, explained by a cause; and whether W as told is in it."""
+    size = params.surprises.of(cause).size
+    believes = told is not None and is_believed(linear, state.cov, cause, size, told)
     if cause is Cause.CURRENT:
         linear = linear.first(2)  # a current that is wrong is left out, be it as near as it may
-    linear, cov = opened(linear, state.cov, cause, params.surprises.of(cause).size)
+    linear, cov = opened(linear, state.cov, cause, size)
+    if believes and told is not None:
+        linear = linear.with_own(told.x, told.tells)
     rows, e = linear.rows, linear.innovation
     weight = np.asarray(np.linalg.inv(rows @ cov @ rows.T + linear.noise), dtype=np.float64)
     gain = cov @ rows.T @ weight
@@ -243,7 +261,7 @@ def _updated(
         nis=state.nis + counts * float(e @ weight @ e),
         dof=state.dof + counts * len(e),
     )
-    return state, Update(rows, gain, weight, e)
+    return state, Update(rows, gain, weight, e), believes
 
 
 def _learnt(

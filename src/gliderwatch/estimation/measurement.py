@@ -11,6 +11,7 @@ import numpy as np
 
 from gliderwatch.estimation.flow import FlowParams, mean_flow
 from gliderwatch.estimation.observation import Observation
+from gliderwatch.estimation.reckoned import Reckoned
 from gliderwatch.model import Array
 
 OWN, SLIP, SIDE = -3, -2, -1
@@ -32,6 +33,16 @@ class Linear:
     def first(self, m: int) -> Linear:
         """The first ``m`` of the measurements."""
         return Linear(self.rows[:m], self.innovation[:m], self.noise[:m, :m])
+
+    def with_own(self, x: Array, told: Reckoned) -> Linear:
+        """These and W as ``told``, at the state ``x`` ((n,))."""
+        row = np.zeros((1, len(x)))
+        row[0, OWN] = 1.0
+        m = len(self.rows)
+        noise = np.zeros((m + 1, m + 1))
+        noise[:m, :m], noise[m, m] = self.noise, told.sigma**2
+        innovation = np.append(self.innovation, told.speed - x[OWN])
+        return Linear(np.concatenate([self.rows, row]), innovation, noise)
 
 
 @dataclass(frozen=True, slots=True)

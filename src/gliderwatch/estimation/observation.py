@@ -158,7 +158,11 @@ def _slip(dive: Dive) -> float:
     1 - tan(theta) / tan(theta + alpha) = alpha / (sin theta cos theta) to first order.
     """
     pitches = [abs(dive.evidence[name]) for name in ("pitch_dive", "pitch_climb") if name in dive.evidence]
-    pitch = sum(pitches) / len(pitches) if pitches else USUAL_PITCH
+    return slip_at(sum(pitches) / len(pitches) if pitches else USUAL_PITCH)
+
+
+def slip_at(pitch: float) -> float:
+    """The part of W that the angle of attack takes at a pitch (rad)."""
     return DRAG_BY_LIFT / math.sin(min(max(pitch, FLATTEST), STEEPEST)) ** 2
 
 

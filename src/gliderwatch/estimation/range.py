@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gliderwatch.estimation.causes import FASTEST
 from gliderwatch.model import Array, readonly
 
 LIKE = 0.1
@@ -88,7 +88,7 @@ def speed_range(normal: Normal, at: float, params: RangeParams) -> SpeedRange | 
         return None
     strongest = np.sort(normal.settings[weaker])[-params.least]
     found = _range(normal.speeds[weaker & (normal.settings >= strongest)], params)
-    return SpeedRange(found.low, found.usual, inf, found.dives)
+    return SpeedRange(found.low, found.usual, FASTEST, found.dives)
 
 
 def _alike(normal: Normal, at: float) -> NDArray[np.bool_]:

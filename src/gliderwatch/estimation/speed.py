@@ -7,7 +7,7 @@ or by evidence over several dives. No flag: its speed cannot be known from this 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import degrees
+from math import degrees, inf
 from statistics import median
 
 from gliderwatch.detection.consistency import KEPT, Misfit, blame, disagrees, misfit
@@ -15,8 +15,10 @@ from gliderwatch.detection.sequential import cusum, cusum_bound
 from gliderwatch.estimation import joint
 from gliderwatch.estimation.causes import Cause
 from gliderwatch.estimation.joint import JointInfo, JointParams, JointState
-from gliderwatch.estimation.observation import are_apart
+from gliderwatch.estimation.observation import USUAL_PITCH, are_apart, slip_at
 from gliderwatch.estimation.range import Normal, RangeParams, SpeedRange, learn, setting, speed_range
+from gliderwatch.estimation.reckoned import Ratios, Reckoned, reckon
+from gliderwatch.estimation.reckoned import learn as learn_ratios
 from gliderwatch.model import Dive, Flag
 
 DIVES_A_MONTH = 240.0
@@ -24,6 +26,8 @@ DIVES_A_MONTH = 240.0
 DEPARTURE, SLACK = 0.08, 1.0
 """Part of the usual speed by which a healthy glider's speed varies at least, for the sum of small losses;
 and how many times that does not add to the sum."""
+OWN_SURE = 0.15
+"""Standard error of W on a dive, as part of it, up to which the dive tells what W is to what is reported."""
 ROLLED, ROLLS = 0.12, 5
 """rad: a step of the mean roll that speaks for a lost or bent wing; dives that tell the usual roll, and
 samples that tell the roll of a dive."""
@@ -57,7 +61,8 @@ class SpeedState:
 
     ``joint`` estimate (None: no dive yet), ``normal`` speeds learnt, ``rolls`` (rad) of the first healthy
     dives, ``rolled`` dives in a row that roll otherwise, ``slow`` Page's sum of small losses, ``doubted``
-    slow dives in a row that were not believed, ``misfits`` of the last dives.
+    slow dives in a row that were not believed, ``misfits`` of the last dives, ``ratios`` of the speed to
+    what the glider tells of it.
     """
 
     joint: JointState | None = None
@@ -67,6 +72,7 @@ class SpeedState:
     slow: float = 0.0
     doubted: int = 0
     misfits: tuple[Misfit, ...] = ()
+    ratios: Ratios = Ratios()
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,13 +101,15 @@ def step(
     rolled = state.rolled + 1 if _rolls(state, dive) else 0
     usual = learnt.usual if learnt else None
     # the first of two dives may have been half over when it happened
-    estimate, info = joint.step(state.joint, dive, params.joint, usual, hint=1 <= rolled <= 2)
+    told = reckon(state.ratios, dive.evidence)
+    estimate, info = joint.step(state.joint, dive, params.joint, usual, hint=1 <= rolled <= 2, tells=told)
     if info is None:
-        return state, Verdict(None, dive.reason, normal, None)
+        flag, reason = _of_reckoning_alone(state, dive, told, normal, params)
+        return state, Verdict(flag, reason, normal, None)
     state = replace(state, joint=estimate, rolled=rolled, misfits=_misfits(state, info))
     flag, reason = _wrong(state, info, params)
     if flag is None and not reason:
-        state, flag, reason = _slow_or_fast(state, info, normal, params)
+        state, flag, reason = _slow_or_fast(state, info, told, normal, params)
     if flag is Flag.NORMAL and not frozen:
         state = _learnt(state, dive, info, at, params)
     return state, Verdict(flag, reason, normal, info)
@@ -117,7 +125,7 @@ def _misfits(state: SpeedState, info: JointInfo) -> tuple[Misfit, ...]:
 
 def _wrong(state: SpeedState, info: JointInfo, params: SpeedParams) -> tuple[Flag | None, str]:
     """Flag 2 where a measurement is wrong; no flag with a reason where the dive says nothing of the speed."""
-    if info.seen.current is None:
+    if info.seen.current is None and not info.believes:
         return None, "no depth-averaged current"
     if info.across is not None and disagrees(state.misfits[-1], params.gate, params.least):
         return Flag.FALSE_ALARM, str(blame(state.misfits, params.gate, params.least))
@@ -134,16 +142,30 @@ def _wrong(state: SpeedState, info: JointInfo, params: SpeedParams) -> tuple[Fla
     return None, ""
 
 
+def _of_reckoning_alone(
+    state: SpeedState, dive: Dive, told: Reckoned | None, normal: SpeedRange, params: SpeedParams
+) -> tuple[Flag | None, str]:
+    """Flag 1 where a dive without track is slow by what the glider tells at once; else its reason."""
+    if told is None or not told.is_prompt or state.joint is None or not normal.dives:
+        return None, dive.reason
+    # no course that was steered can look like this: the bound is wide because nothing else confirms it
+    if (told.speed + 2 * params.confidence * told.sigma) * (1 - _usual_slip(params)) < normal.low:
+        return Flag.ANOMALY, f"slower than normal by depth rate and pitch alone ({dive.reason})"
+    return None, dive.reason
+
+
 def _slow_or_fast(
-    state: SpeedState, info: JointInfo, normal: SpeedRange, params: SpeedParams
+    state: SpeedState, info: JointInfo, told: Reckoned | None, normal: SpeedRange, params: SpeedParams
 ) -> tuple[SpeedState, Flag | None, str]:
     """The flag that the speed gives, and the state with the sum of small losses and the doubts."""
-    if info.single_sigma > params.vague * normal.usual:
+    believed = told if info.believes else None
+    sigma_own = min(info.single_sigma, believed.sigma if believed is not None else inf)
+    if sigma_own > params.vague * normal.usual:
         return state, None, "the speed cannot be known: the glider turned too much"
     # what is common to all dives is also in a range that was learnt from them
     sigma = params.confidence * (info.estimate.own_sigma if normal.dives else info.estimate.sigma)
     if info.estimate.speed + sigma < normal.low:
-        if not state.doubted and _may_have_turned(info, normal):
+        if not state.doubted and believed is None and _may_have_turned(info, normal):
             reason = "slow, or it turned while its heading was not seen: the next dive will tell"
             return replace(state, doubted=1), None, reason
         return state, Flag.ANOMALY, _how_slow(info, normal, params)
@@ -153,6 +175,11 @@ def _slow_or_fast(
             return state, Flag.FALSE_ALARM, "faster than ever: the current is wrong, or it is driven harder"
         return state, Flag.ANOMALY, "faster than normal"
     return _small_losses(state, info, normal, params)
+
+
+def _usual_slip(params: SpeedParams) -> float:
+    """The part of W that a usual angle of attack takes."""
+    return params.joint.slip * slip_at(USUAL_PITCH)
 
 
 def _may_have_turned(info: JointInfo, normal: SpeedRange) -> bool:
@@ -196,7 +223,10 @@ def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: S
     roll = dive.evidence.get("roll_mean")
     if roll is not None and len(state.rolls) < 3 * ROLLS:
         state = replace(state, rolls=(*state.rolls, roll))
-    if params.learning is None or info.told is not None:
+    own = info.seen.own_speed()
+    if own is not None and own[1] < OWN_SURE * own[0]:
+        state = replace(state, ratios=learn_ratios(state.ratios, dive.evidence, own[0]))
+    if params.learning is None or info.told is not None or info.seen.current is None:
         return state
     hours = dive.evidence.get("duration_h", 0.0)
     return replace(state, normal=learn(state.normal, info.estimate.speed, at, hours, params.learning))

@@ -17,7 +17,7 @@ from gliderwatch.navigation.fixes import FASTEST, distance, new_fixes
 from gliderwatch.navigation.flight import SPARSE, Flight, find_flight
 from gliderwatch.navigation.quality import flight_notes, heading_gap, segment_notes, why_unusable
 from gliderwatch.navigation.samples import Samples, after, concatenated, get, prepare
-from gliderwatch.navigation.track import build_track, evidence
+from gliderwatch.navigation.track import attitude, build_track, evidence
 
 SHORTEST = 900.0
 """Seconds: a shorter stay under water says too little of speed, a shorter hole in the data is none."""
@@ -159,7 +159,7 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
     missing = sum(min(b, end.t) - a for a, b in state.holes if a < end.t) if end is not None else 0.0
     reason = why_unusable(samples, flight, start, end, missing)
     track = None
-    numbers: Mapping[str, float] = {"duration_h": flight.duration / 3600}
+    numbers: Mapping[str, float] = {"duration_h": flight.duration / 3600} | attitude(samples, flight)
     if start is not None and end is not None and not reason:
         track = build_track(samples, flight, start, end)
         numbers = evidence(samples, flight, track)

@@ -18,7 +18,8 @@ SPACING = 30.0
 """Seconds: finer samples are averaged to this. A glider turns and pitches in minutes, and a
 checkpoint that carries a dive on to the next segment stays small also for 4 s data."""
 
-_KEPT = ("pitch", "roll", "depth", "speed_onboard", "dr_state", "dr_time")
+_VOLUMES = ("ballast", "oil_volume")
+_KEPT = ("pitch", "roll", "depth", "speed_onboard", "dr_state", "dr_time", "thruster_on", "vacuum", *_VOLUMES)
 _PAIRS = (("fix_lat", "fix_lon"), ("dr_lat", "dr_lon"))
 _EXACT = ("fix_", "current_")
 """Beginnings of the names of quantities of which every value matters."""
@@ -71,7 +72,8 @@ def prepare(segment: Segment, declination: float) -> Samples:
 
     Keys: ``fix_lat, fix_lon, dr_lat, dr_lon`` (degrees), ``heading_e, heading_n`` (unit vectors;
     the commanded heading where the measured one is absent), ``pitch, roll`` (rad), ``depth`` (m),
-    ``speed_onboard`` (m/s), ``dr_state``, ``dr_time`` (s).
+    ``speed_onboard`` (m/s), ``dr_state``, ``dr_time`` (s), ``thruster_on`` (0 to 1), ``vacuum`` (Pa),
+    ``ballast``, ``oil_volume`` (m3).
     """
     source = "heading" if len(segment.get("heading")) else "heading_commanded"
     wanted = (*_KEPT, source, *(name for pair in _PAIRS for name in pair))

@@ -14,6 +14,12 @@ from gliderwatch.navigation.samples import Samples, get
 
 NOMINAL_SPEED = 0.3
 """m/s: shapes a track where the glider reports no speed; the fixes correct its length."""
+FEW = 3
+"""Samples in a dive that say how much the thruster was on, or the pump moved."""
+STEEP = 0.1
+"""rad: pitch of a glider that dives or climbs and does not turn."""
+PUMPED = 20e-6
+"""m3: a pump that moved less is on its way."""
 CIRCLING = 0.1
 """Length of the mean heading vector below which a mean direction means nothing."""
 
@@ -89,7 +95,7 @@ def evidence(samples: Samples, flight: Flight, track: Track) -> dict[str, float]
         "heading_steadiness": float(np.hypot(*mean)) * interval / max(flown, 1.0),
         "heading_mean": degrees(atan2(mean[0], mean[1])) % 360,
     }
-    return out | _attitude(samples, flight)
+    return out | attitude(samples, flight)
 
 
 def mean_heading(track: Track) -> tuple[Array, float]:
@@ -124,23 +130,46 @@ def closure(track: Track, current: Current) -> dict[str, float]:
     }
 
 
-def _attitude(samples: Samples, flight: Flight) -> dict[str, float]:
+def attitude(samples: Samples, flight: Flight) -> dict[str, float]:
     """Depth, pitch, roll and depth rate of the flight, as far as reported."""
     out = {}
     depth = get(samples, "depth").between(flight.start, flight.end)
     pitch = get(samples, "pitch").between(flight.start, flight.end)
     roll = get(samples, "roll").between(flight.start, flight.end)
     speed = get(samples, "speed_onboard").between(flight.start, flight.end)
+    thruster = get(samples, "thruster_on").between(flight.start, flight.end)
     if len(depth) > 3 and np.diff(depth.t).max() < SPARSE:
         out["depth_max"] = float(depth.v.max())
-    for name, part in (("pitch_dive", pitch.v[pitch.v < -0.1]), ("pitch_climb", pitch.v[pitch.v > 0.1])):
+    for name, part in (("pitch_dive", pitch.v[pitch.v < -STEEP]), ("pitch_climb", pitch.v[pitch.v > STEEP])):
         if len(part):
             out[name] = float(np.mean(part))
     if len(roll):
         out |= {"roll_mean": float(np.mean(roll.v)), "roll_std": float(np.std(roll.v))}
     if len(speed):
         out["onboard_speed"] = float(np.mean(speed.v))
-    return out | _depth_rates(depth)
+    if len(thruster) >= FEW:
+        out["thruster"] = float(np.mean(thruster.v))
+    return out | _depth_rates(depth) | _yos(pitch) | _volumes(samples, flight)
+
+
+def _yos(pitch: Series) -> dict[str, float]:
+    """How often the glider turned from dive to climb."""
+    steep = pitch.v[np.abs(pitch.v) > STEEP]
+    yos = int(np.sum((steep[:-1] < 0) & (steep[1:] > 0)))
+    return {"yos": float(yos)} if yos else {}
+
+
+def _volumes(samples: Samples, flight: Flight) -> dict[str, float]:
+    """Volume pumped (m3) while diving and while climbing, of either pump, and vacuum (Pa)."""
+    out = {}
+    moved = max((get(samples, name) for name in ("ballast", "oil_volume")), key=len)
+    v = moved.between(flight.start, flight.end).v
+    # the pump has moved most of the time: what lies between is it moving
+    for name, part in (("ballast_dive", v[v < -PUMPED]), ("ballast_climb", v[v > PUMPED])):
+        if len(part) >= FEW:
+            out[name] = float(np.median(part))
+    vacuum = get(samples, "vacuum").between(flight.start, flight.end)
+    return out | ({"vacuum": float(np.median(vacuum.v))} if len(vacuum) else {})
 
 
 def _depth_rates(depth: Series) -> dict[str, float]:

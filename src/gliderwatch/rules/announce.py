@@ -13,6 +13,7 @@ from typing import Protocol
 
 from gliderwatch.alerts import message
 from gliderwatch.model import Alert, Assessment, Incident
+from gliderwatch.rules.overdue import Silence
 
 NEWS = 86400.0
 """Seconds: an incident that was over for longer when it became known is history, not news."""
@@ -37,10 +38,12 @@ class Thread:
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """What people have been told of one glider; ``surfaced`` is the surfacing of the last notice (s)."""
+    """What people have been told of one glider; ``surfaced`` is the surfacing of the last notice (s), and
+    ``silences`` what was told of its staying away (`rules.overdue`)."""
 
     threads: tuple[Thread, ...] = ()
     surfaced: float | None = None
+    silences: tuple[Silence, ...] = ()
 
 
 class Known(Protocol):
@@ -85,7 +88,8 @@ def due(said: Said, known: Known, reminder_hours: float | None, notices: bool) -
         previous = before_it.t_surface if before_it is not None else None
         alerts.append(message.surfacing(latest, previous, alert_id=identity))
         surfaced = latest.t_surface
-    return Said(tuple(threads), surfaced), sorted(alerts, key=lambda a: a.time)
+    said = replace(said, threads=tuple(threads), surfaced=surfaced)
+    return said, sorted(alerts, key=lambda a: a.time)
 
 
 def _is_another(dive: Assessment, surfaced: float | None) -> bool:

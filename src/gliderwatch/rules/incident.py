@@ -72,6 +72,11 @@ class Watches:
         return tuple(w.incident for w in (self.anomaly, self.false_alarm) if w.incident is not None)
 
 
+def ended(state: Watches, t: float) -> tuple[Incident, ...]:
+    """The incidents that were open, cleared at a time (s) because the deployment is over."""
+    return tuple(replace(incident, cleared_at=t) for incident in state.open())
+
+
 def judge(state: Watches, dive: Assessment, rules: RuleParams) -> tuple[Watches, tuple[Incident, ...]]:
     """The state after one more dive, and the incidents that it opened, carried on or cleared."""
     if dive.flag is None:

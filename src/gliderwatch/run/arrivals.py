@@ -43,7 +43,7 @@ def judge(
         header = read_header(_plain(path))
     except (Quarantine, Retry) as error:
         return failed(file, error)
-    file = replace(file, glider=header.id.glider, segment=header.id.name)
+    file = replace(file, glider=header.id.glider, segment=header.id.name, opened_at=header.id.opened_at)
     if not is_known(header.id.glider):
         reason = f"glider {header.id.glider} is not in the configuration"
         return replace(file, status=Status.UNKNOWN, reason=reason)

@@ -12,7 +12,6 @@ import stat
 import threading
 import time
 from collections import deque
-from concurrent.futures import Future
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from types import FrameType
@@ -23,17 +22,17 @@ from gliderwatch.config import Config, load
 from gliderwatch.errors import ConfigError, GliderwatchError, Quarantine
 from gliderwatch.ingest.watch import CacheChanged, FileChanged
 from gliderwatch.model import Alert, Segment
-from gliderwatch.run import arrivals, intake, logs, notify
+from gliderwatch.run import arrivals, heartbeat, intake, logs, notify
 from gliderwatch.run.backlog import Job
+from gliderwatch.run.heartbeat import Upkeep
 from gliderwatch.run.intake import Speaking
 from gliderwatch.run.life import BEAT, Life
 from gliderwatch.run.parts import Decoded, News, Parts, build
+from gliderwatch.run.ticking import Ticking
 from gliderwatch.store.sqlite import File, Status, Store
 
 log = structlog.get_logger(__name__)
 
-STALLED = 60.0
-"""Seconds without progress after which the dispatcher counts as stuck."""
 _AT_ONCE = 100
 """Files looked at in one turn, so that signals and signs of life do not wait for a long list."""
 
@@ -46,6 +45,8 @@ class Daemon:
         self._state = Path(config.state.path)
         self._life = Life(self._state)
         self._store = Store.open(self._state)
+        self._ticking = Ticking(self._store)
+        self._upkeep = Upkeep(config, self._store)
         self._news: SimpleQueue[News] = SimpleQueue()
         self._wake = threading.Event()
         self._stopping = False
@@ -54,9 +55,12 @@ class Daemon:
     def _use(self, parts: Parts) -> None:
         """Work with these parts, from nothing: a scan finds again what was at hand."""
         self._parts, self._caches = parts, parts.watcher.cache_folders()
+        self._upkeep.use(parts.config)
         self._settled: deque[Path] = deque()
         self._caught_up = self._retry = False
         self._next_scan = self._next_beat = time.monotonic()
+        # files that came while nobody watched settle first
+        self._next_tick = self._next_scan + parts.config.dockserver.settle_seconds + 1.0
 
     def run(self) -> None:
         """Watch until SIGTERM or SIGINT."""
@@ -76,6 +80,7 @@ class Daemon:
             raise
         finally:
             notify.notify("STOPPING=1")
+            self._upkeep.stop()
             self._parts.stop()
             self._store.close()
             self._life.end()
@@ -100,6 +105,8 @@ class Daemon:
         if not self._settled:  # all that came together is in order of time before the first is taken
             self._parts.feed()
             self._catch_up()
+        if self._caught_up and time.monotonic() >= self._next_tick:
+            self._tick()
         if time.monotonic() >= self._next_beat:
             self._beat()
 
@@ -107,9 +114,9 @@ class Daemon:
         """Seconds until something is due."""
         now = time.monotonic()
         settled = 0.0 if self._settled else self._parts.settling.next_deadline(now)
-        return max(
-            0.0, min(self._next_scan - now, self._next_beat - now, BEAT if settled is None else settled)
-        )
+        due = [self._next_scan - now, self._next_beat - now, BEAT if settled is None else settled]
+        due += [self._next_tick - now] if self._caught_up else []
+        return max(0.0, min(due))
 
     def _hear(self, pause: float) -> None:
         """Wait for news and heed what has come by then; what comes meanwhile has its turn later."""
@@ -171,6 +178,7 @@ class Daemon:
     def _judge(self, path: Path) -> None:
         found = arrivals.judge(path, self._store, self._caches, self._is_known)
         if isinstance(found, Job):
+            self._upkeep.queued(found)
             self._parts.backlog.add(found)
         elif found is not None:
             self._note(found)
@@ -182,7 +190,8 @@ class Daemon:
         backlog = self._parts.backlog
         if news.backlog is not backlog:
             return  # of before the configuration was read again: the scan has found it again
-        backlog.finish(news.job, _outcome(news.future))
+        self._upkeep.decoded(news.job)
+        backlog.finish(news.job, news.outcome)
         while (job := backlog.decoded(news.job.header.id.glider)) is not None:
             self._take(job)
         self._parts.feed()
@@ -204,13 +213,15 @@ class Daemon:
     def _take_in(self, file: File, segment: Segment) -> None:
         glider = segment.id.glider
         params, speaking = self._parts.config.glider(glider), self._speaking(glider)
+        begun = time.monotonic()
         try:
-            taken = intake.take(self._store, file, segment, params, speaking, time.time(), self._is_stopping)
+            now, ocean = time.time(), self._parts.ocean.field(glider)
+            taken = intake.take(self._store, file, segment, params, speaking, now, self._is_stopping, ocean)
         except Quarantine as error:
             log.error("file cannot be assessed", path=file.path, exc_info=error.__cause__)
             self._note(arrivals.failed(file, error))
         else:
-            self._told(taken)
+            self._told(taken, time.monotonic() - begun)
 
     def _is_stopping(self) -> bool:
         return self._stopping
@@ -243,8 +254,17 @@ class Daemon:
         for glider in self._store.gliders():
             self._speak(glider)
 
-    def _told(self, taken: intake.Taken) -> None:
+    def _tick(self) -> None:
+        """Say which gliders are overdue, and look again when the next may be."""
+        gliders, speaking = sorted(self._parts.config.gliders), self._parts.speaking
+        now, is_busy = time.monotonic(), self._parts.backlog.more
+        alerts, pause = self._ticking.tick(gliders, speaking, is_busy, time.time(), now)
+        self._next_tick = now + pause
+        self._alerted(alerts)
+
+    def _told(self, taken: intake.Taken, seconds: float | None = None) -> None:
         logs.taken(taken)
+        self._upkeep.took(taken, seconds)
         self._alerted(taken.alerts)
 
     def _alerted(self, alerts: tuple[Alert, ...]) -> None:
@@ -257,17 +277,18 @@ class Daemon:
     def _beat(self) -> None:
         """A sign of life, if all parts live; a dead observer is started again."""
         self._next_beat = time.monotonic() + min(BEAT, notify.watchdog_seconds() or BEAT)
-        watcher, dispatcher = self._parts.watcher, self._parts.dispatcher
+        watcher, backlog = self._parts.watcher, self._parts.backlog
         if not watcher.alive():
             log.error("observer died, started again")
             watcher.restart()
             self._next_scan = time.monotonic()
-        late = time.monotonic() - dispatcher.progress()
-        if not dispatcher.alive() or late > STALLED:
-            log.error("dispatcher is stuck: no sign of life given", seconds=round(late))
+        at_hand = len(backlog) + len(self._settled)
+        is_well = self._upkeep.is_well(self._parts.dispatcher, backlog.decoding)
+        self._alerted(self._upkeep.beat(is_well, at_hand))
+        if not is_well:
             return
         self._life.beat()
-        counts, at_hand = self._store.counts(), len(self._parts.backlog) + len(self._settled)
+        counts = self._store.counts()
         waiting, bad = (counts.get(status, 0) for status in (Status.WAITING, Status.QUARANTINED))
         notify.notify("WATCHDOG=1", f"STATUS={at_hand} files at hand, {waiting} waiting, {bad} quarantined")
 
@@ -279,6 +300,7 @@ class Daemon:
             config = load(self._config_path)
             if Path(config.state.path) != self._state:
                 raise ConfigError("state.path can only be changed by a restart")
+            heartbeat.url(config)
             parts = build(config, self._news, self._wake, self._workers, before)
         except GliderwatchError as error:
             log.error("configuration refused, the old one is kept", reason=str(error))
@@ -288,8 +310,3 @@ class Daemon:
             parts.start(before)
             log.info("configuration read again", gliders=sorted(config.gliders))
         notify.notify("READY=1")
-
-
-def _outcome(future: Future[Segment]) -> Segment | Exception:
-    error = future.exception()
-    return error if isinstance(error, Exception) else future.result()

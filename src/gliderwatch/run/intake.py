@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
 
+from gliderwatch.currents.field import Field
 from gliderwatch.errors import GliderwatchError, Quarantine
-from gliderwatch.model import Alert, Assessment, Segment
-from gliderwatch.params import GliderParams
+from gliderwatch.model import Alert, Assessment, Expected, Segment, SegmentId
+from gliderwatch.params import Attention, GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
+from gliderwatch.rules import overdue, silence
 from gliderwatch.rules.announce import due
+from gliderwatch.rules.overdue import RECENT
 from gliderwatch.store.sqlite import File, Status, Store
 
 
 @dataclass(frozen=True, slots=True)
 class Speaking:
-    """Who is told: ``channels`` of an alert, and of which gliders surfacing notices are wanted."""
+    """Who is told: ``channels`` of an alert, of which gliders surfacing notices are wanted, and how the
+    silence of a glider is taken."""
 
     channels: Callable[[Alert], Iterable[str]]
     notices: Callable[[str], bool]
+    attention: Callable[[str], Attention] = field(default=lambda glider: Attention())
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,16 +47,19 @@ def take(
     speaking: Speaking | None,
     now: float,
     stopping: Callable[[], bool] = lambda: False,
+    ocean: Field | None = None,
 ) -> Taken:
     """Put a segment in its place and go on from the checkpoint before it; say what is to be said.
 
     A copy that holds no more than the one known is only noted. `speaking` is None while more files of the
-    glider are at hand: then the last of them speaks for all. `now` (s) dates the rows, and decides nothing.
+    glider are at hand: then the last of them speaks for all. `now` (s) is when the file came; `ocean` is a
+    model's field, where dives are compared with one.
     Raises Quarantine for a segment that cannot be assessed, StoppedError once `stopping` holds; then
     nothing has changed.
     """
     glider = segment.id.glider
     with store.transaction():
+        store.hear(segment.id, segment.last_t, now)
         known = store.completeness(glider, segment.id.name)
         if known is not None and known >= segment.completeness:
             file = replace(file, status=Status.DUPLICATE, reason="this segment is known from a fuller copy")
@@ -59,15 +67,20 @@ def take(
             return Taken(file, alerts=_speak(store, glider, params, speaking, now))
         file = replace(file, status=Status.TAKEN, reason="")
         store.note(file, now)
-        assessments = _run(store, segment, params, stopping)
+        assessments = _run(store, segment, params, stopping, ocean)
         alerts = _speak(store, glider, params, speaking, now)
     return Taken(file, assessments, alerts)
 
 
 def note(store: Store, file: File, params: GliderParams, speaking: Speaking | None, now: float) -> Taken:
-    """Write down a file that cannot be taken (now); say what earlier files of its glider left to be said."""
+    """Write down a file that cannot be taken (now); say what earlier files of its glider left to be said.
+
+    It is a sign of life all the same, if its header tells of what.
+    """
     with store.transaction():
         store.note(file, now)
+        if file.opened_at is not None and file.status != Status.UNKNOWN:
+            store.hear(SegmentId(file.opened_at, file.glider, file.segment), None, now)
         alerts = _speak(store, file.glider, params, speaking, now) if file.glider else ()
     return Taken(file, alerts=alerts)
 
@@ -80,15 +93,56 @@ def speak(
         return _speak(store, glider, params, speaking, now)
 
 
+def tick(
+    store: Store, glider: str, speaking: Speaking, others: Iterable[str], now: float
+) -> tuple[Alert, ...]:
+    """Say that a glider is overdue, if it is at `now` (s); `others` are watched as well."""
+    due_at = next_tick(store, glider, speaking, now)
+    if due_at is None or due_at > now:
+        return ()
+    with store.transaction():
+        fleet = silence.fleet(_outlooks(store, others, now), now)
+        said, hours = store.said(glider), speaking.attention(glider).overdue_hours
+        silences, alerts = overdue.tick(said.silences, store.known(glider), fleet, hours, now)
+        if silences != said.silences:
+            store.say(glider, replace(said, silences=silences), alerts, speaking.channels, now)
+    return tuple(alerts)
+
+
+def _outlooks(
+    store: Store, gliders: Iterable[str], now: float
+) -> Iterator[tuple[Expected, tuple[silence.Sign, ...]]]:
+    """What is expected of gliders at `now` (s), and their signs of life; of those of which it is known."""
+    for known in map(store.known, gliders):
+        signs = known.signs(now - RECENT)
+        expected = known.expected(now) or silence.guess(signs, now)
+        if expected is not None:
+            yield expected, signs
+
+
+def next_tick(store: Store, glider: str, speaking: Speaking, now: float) -> float | None:
+    """When `tick` has something to say of a glider next (s), None: never."""
+    attention = speaking.attention(glider)
+    if attention.recovered:
+        return None
+    at = overdue.next_tick(store.said(glider).silences, store.known(glider), attention.overdue_hours, now)
+    return at if at is None or attention.muted_until is None else max(at, attention.muted_until)
+
+
 def _run(
-    store: Store, segment: Segment, params: GliderParams, stopping: Callable[[], bool]
+    store: Store,
+    segment: Segment,
+    params: GliderParams,
+    stopping: Callable[[], bool],
+    ocean: Field | None,
 ) -> tuple[Assessment, ...]:
     state, todo = store.resume(store.put(segment))
     dives: dict[float, Assessment] = {}
     for identity in todo:
         if stopping():
             raise StoppedError(f"{segment.id.name} was not taken in: the daemon ends")
-        outcome = _process(state, segment if identity == segment.id else store.segment(identity), params)
+        one = segment if identity == segment.id else store.segment(identity)
+        outcome = _process(state, one, params, ocean)
         store.apply(identity.glider, outcome)
         store.checkpoint(identity, outcome.state)
         state = outcome.state
@@ -99,10 +153,10 @@ def _run(
     return tuple(dives.values())
 
 
-def _process(state: GliderState, segment: Segment, params: GliderParams) -> Outcome:
+def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: Field | None) -> Outcome:
     """`process`, in which one segment of unforeseen content must not stop all gliders for good."""
     try:
-        return process(state, segment, params)
+        return process(state, segment, params, ocean)
     except Exception as error:
         what = f"{type(error).__name__}: {error}"
         raise Quarantine(f"cannot be assessed, please report it ({segment.id.name}: {what})") from error
@@ -111,10 +165,14 @@ def _process(state: GliderState, segment: Segment, params: GliderParams) -> Outc
 def _speak(
     store: Store, glider: str, params: GliderParams, speaking: Speaking | None, now: float
 ) -> tuple[Alert, ...]:
-    if speaking is None:
+    if speaking is None or speaking.attention(glider).is_quiet(now):
         return ()
-    before = store.said(glider)
-    said, alerts = due(before, store.known(glider), params.rules.reminder_hours, speaking.notices(glider))
+    before, known = store.said(glider), store.known(glider)
+    silences, heard = overdue.hear(before.silences, known, now)
+    said, alerts = due(
+        replace(before, silences=silences), known, params.rules.reminder_hours, speaking.notices(glider)
+    )
+    alerts = [*heard, *alerts]
     if said != before or alerts:
         store.say(glider, said, alerts, speaking.channels, now)
     return tuple(alerts)

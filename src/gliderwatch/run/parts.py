@@ -20,6 +20,7 @@ from gliderwatch.ingest.watch import Change, Watcher
 from gliderwatch.model import Segment
 from gliderwatch.run.backlog import Backlog, Job
 from gliderwatch.run.intake import Speaking
+from gliderwatch.run.ocean import Ocean
 from gliderwatch.run.speaking import speaking
 from gliderwatch.store.outbox import Outbox
 
@@ -31,6 +32,12 @@ class Decoded:
     backlog: Backlog
     job: Job
     future: Future[Segment]
+
+    @property
+    def outcome(self) -> Segment | Exception:
+        """The segment, or why there is none."""
+        error = self.future.exception()
+        return error if isinstance(error, Exception) else self.future.result()
 
 
 News = Change | Decoded | signal.Signals
@@ -49,6 +56,7 @@ class Parts:
     decoder: Decoder
     backlog: Backlog
     dispatcher: Dispatcher
+    ocean: Ocean
     urls: dict[str, str] = field(repr=False)
 
     def start(self, before: Parts | None = None) -> None:
@@ -105,5 +113,6 @@ def build(
         Decoder(watcher.cache_folders(), max_workers=workers),
         Backlog(),
         dispatcher,
+        Ocean(config),
         urls,
     )

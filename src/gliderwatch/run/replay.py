@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 import threading
 import time
@@ -17,14 +18,17 @@ from gliderwatch.config import Config, expand
 from gliderwatch.errors import GliderwatchError, Quarantine, Retry
 from gliderwatch.ingest import names
 from gliderwatch.ingest.decode import Decoder
-from gliderwatch.model import Segment
+from gliderwatch.model import Alert, Segment
 from gliderwatch.params import GliderParams
+from gliderwatch.rules.silence import GONE
 from gliderwatch.run import arrivals, intake
 from gliderwatch.run.backlog import Job
 from gliderwatch.run.intake import Speaking
 from gliderwatch.run.life import alive_path
 from gliderwatch.run.lines import alert_line, assessment_line, write_lines
+from gliderwatch.run.ocean import Ocean
 from gliderwatch.run.speaking import NOBODY, speaking
+from gliderwatch.run.turns import Turns
 from gliderwatch.store.database import MEMORY
 from gliderwatch.store.outbox import Outbox
 from gliderwatch.store.sqlite import Status, Store
@@ -60,11 +64,16 @@ class Request:
 
 @dataclass(slots=True)
 class Report:
-    """What a replay found: files by status with reasons, and the store that holds the rest."""
+    """What a replay found: files by status with reasons, and the store that holds the rest.
+
+    ``clock`` is what time it is for each glider (s): that of its data.
+    """
 
     store: Store
+    ocean: Ocean | None = None
     files: Counter[Status] = field(default_factory=Counter)
     undelivered: int = 0
+    clock: dict[str, float] = field(default_factory=dict)
 
 
 def replay(
@@ -82,12 +91,15 @@ def replay(
     on_total(len(files))
     caches = cache_folders(request)
     with _state(request) as path:
-        report = Report(Store.open(path, durable=False))
+        ocean = None if request.config is None else Ocean(request.config)
+        report = Report(Store.open(path, durable=False), ocean)
         with _speaking(request, path, report) as told:
             jobs = _triage(files, report, caches, request, on_file)
             _check_glider(request, jobs, report.store)
-            for job in _decoded(jobs, caches, workers):
-                _take(job, report, request, told, on_file)
+            turns = Turns(jobs)
+            for decoded in _decoded(jobs, caches, workers):
+                for job, sent in turns.after(decoded):
+                    _take(job, sent, report, request, told, on_file)
         if request.out is not None:
             _write(request.out, report.store)
     return report
@@ -168,7 +180,7 @@ def _speaking(request: Request, path: Path | str, report: Report) -> Iterator[Sp
 
 def _silent(config: Config) -> Speaking:
     """The messages of a configuration, for nobody: they are made and shown, not sent."""
-    return Speaking(channels=NOBODY.channels, notices=speaking(config).notices)
+    return replace(speaking(config), channels=NOBODY.channels)
 
 
 def _triage(
@@ -179,7 +191,7 @@ def _triage(
     on_file: Callable[[intake.Taken], None],
 ) -> list[Job]:
     """The files to decode in the order of time, the fullest copy of a segment first."""
-    jobs = []
+    jobs: list[Job] = []
     for path in files:
         found = arrivals.judge(path, report.store, caches, request.is_wanted)
         if isinstance(found, Job):
@@ -209,19 +221,40 @@ def _decoded(jobs: Sequence[Job], caches: Sequence[Path], workers: int) -> Itera
 
 def _take(
     job: Job,
+    sent: float,
     report: Report,
     request: Request,
     told: Speaking,
     on_file: Callable[[intake.Taken], None],
 ) -> None:
-    params = request.params(job.header.id.glider)
+    """Let the clock run until a file was `sent` (s), and take it."""
+    glider = job.header.id.glider
+    params, ticked = request.params(glider), _tick(glider, report, told, sent)
     try:
         if not isinstance(job.result, Segment):
             raise job.result if job.result is not None else Retry("was not decoded")
-        taken = intake.take(report.store, job.file, job.result, params, told, time.time())
+        ocean = None if report.ocean is None else report.ocean.field(glider)
+        taken = intake.take(report.store, job.file, job.result, params, told, sent, ocean=ocean)
     except (Quarantine, Retry) as error:
-        taken = intake.note(report.store, arrivals.failed(job.file, error), params, told, time.time())
-    _count(taken, report, on_file)
+        taken = intake.note(report.store, arrivals.failed(job.file, error), params, told, sent)
+    _count(replace(taken, alerts=(*ticked, *taken.alerts)), report, on_file)
+
+
+def _tick(glider: str, report: Report, told: Speaking, until: float) -> list[Alert]:
+    """What a daemon would have said of a glider's silence until a time (s).
+
+    Nothing between two deployments: a replay knows that the first one has ended.
+    """
+    store, alerts = report.store, list[Alert]()
+    others = [other for other in store.gliders() if other != glider and not told.attention(other).recovered]
+    now = last = report.clock.get(glider, -math.inf)
+    at = intake.next_tick(store, glider, told, now) if until - now < GONE else None
+    while at is not None and last < at <= until:
+        alerts += intake.tick(store, glider, told, others, at)
+        last = at
+        at = intake.next_tick(store, glider, told, at)
+    report.clock[glider] = max(until, now)
+    return alerts
 
 
 def _count(taken: intake.Taken, report: Report, on_file: Callable[[intake.Taken], None]) -> None:

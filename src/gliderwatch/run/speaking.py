@@ -14,6 +14,7 @@ def speaking(config: Config) -> Speaking:
     return Speaking(
         channels=lambda alert: channels(alert, config),
         notices=lambda glider: any(glider in r.surfacing for r in config.recipients.values()),
+        attention=config.attention,
     )
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from gliderwatch.config import Config
-from gliderwatch.model import Assessment, Incident
+from gliderwatch.model import Assessment, Expected, Incident
+from gliderwatch.params import Attention
+from gliderwatch.rules.overdue import RECENT
+from gliderwatch.rules.silence import GONE, Awaited, awaited, guess
 from gliderwatch.run.life import STALE, is_held, silence
 from gliderwatch.run.lines import assessment_line, iso
 from gliderwatch.store.sqlite import File, Status, Store, Undelivered
@@ -15,7 +19,10 @@ from gliderwatch.store.sqlite import File, Status, Store, Undelivered
 
 @dataclass(frozen=True, slots=True)
 class GliderStatus:
-    """One glider: its last dive that ended, the open incidents, how many segments and dives are known."""
+    """One glider: its last dive that ended, the open incidents, how many segments and dives are known.
+
+    ``expected`` and ``awaited``: the next surfacing, as known ``at`` a time (s).
+    """
 
     name: str
     configured: bool
@@ -23,6 +30,35 @@ class GliderStatus:
     dives: int
     latest: Assessment | None
     incidents: tuple[Incident, ...]
+    at: float
+    attention: Attention = Attention()
+    expected: Expected | None = None
+    awaited: Awaited | None = None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing was heard for so long that the deployment counts as over."""
+        return self.awaited is not None and self.at - self.awaited.heard >= GONE
+
+    @property
+    def is_muted(self) -> bool:
+        """Whether nothing is told of it now, but will be later."""
+        return self.attention.muted_until is not None and self.at < self.attention.muted_until
+
+    @property
+    def place(self) -> tuple[float, float] | None:
+        """Where the next surfacing is expected (degrees), if the call awaited is the one foreseen."""
+        e = self.expected
+        if e is None or self.awaited is None or self.awaited.t != e.t or e.lat is None or e.lon is None:
+            return None
+        return e.lat, e.lon
+
+    @property
+    def overdue_since(self) -> float | None:
+        """Since when it is overdue (s), None: it is not."""
+        if self.awaited is None or self.attention.recovered or self.is_over or self.at < self.awaited.due:
+            return None
+        return self.awaited.due
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +89,7 @@ def overview(config: Config) -> Overview:
         return Overview(
             running=is_held(path),
             silent_for=silence(path),
-            gliders=tuple(_glider(store, name, name in config.gliders) for name in names),
+            gliders=tuple(_glider(store, name, config, time.time()) for name in names),
             files=store.counts(),
             waiting=tuple(store.files(Status.WAITING)),
             quarantined=tuple(store.files(Status.QUARANTINED)),
@@ -64,11 +100,16 @@ def overview(config: Config) -> Overview:
         store.close()
 
 
-def _glider(store: Store, name: str, configured: bool) -> GliderStatus:
+def _glider(store: Store, name: str, config: Config, now: float) -> GliderStatus:
     segments, dives = store.extent(name)
     latest = store.last_surfacing(name, float("inf"))
     incidents = tuple(i for i in store.incidents(name) if i.cleared_at is None)
-    return GliderStatus(name, configured, segments, dives, latest, incidents)
+    attention, signs = config.attention(name), store.signs(name, now - RECENT)
+    expected = store.expected(name, now) or guess(signs, now)
+    call = awaited(expected, signs, now, attention.overdue_hours) if expected is not None else None
+    return GliderStatus(
+        name, name in config.gliders, segments, dives, latest, incidents, now, attention, expected, call
+    )
 
 
 def as_json(view: Overview) -> dict[str, Any]:
@@ -83,6 +124,7 @@ def as_json(view: Overview) -> dict[str, Any]:
                 "dives": g.dives,
                 "latest": assessment_line(g.latest) if g.latest is not None else None,
                 "incidents": [_incident(i) for i in g.incidents],
+                **_silence(g),
             }
             for g in view.gliders
         },
@@ -105,4 +147,26 @@ def _incident(i: Incident) -> dict[str, Any]:
         "since": iso(i.since),
         "opened_at": iso(i.opened_at),
         "dives": i.dives,
+    }
+
+
+def _silence(g: GliderStatus) -> dict[str, Any]:
+    """The next surfacing, and whether the glider is late for it; null where it is not known."""
+    call, place, muted_until = g.awaited, g.place, g.attention.muted_until
+    return {
+        "expected": None
+        if call is None or g.expected is None
+        else {
+            "t": iso(call.t),
+            "t_sigma": g.expected.t_sigma,
+            "lat": place[0] if place is not None else None,
+            "lon": place[1] if place is not None else None,
+            "source": g.expected.source,
+        },
+        "heard": iso(call.heard) if call is not None else None,
+        "overdue_at": iso(call.due) if call is not None else None,
+        "overdue": g.overdue_since is not None,
+        "ended": g.is_over,
+        "muted_until": iso(muted_until) if muted_until is not None else None,
+        "recovered": g.attention.recovered,
     }

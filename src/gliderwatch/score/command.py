@@ -44,7 +44,7 @@ def score(out: Path, name: str, names: tuple[str, ...], missions: tuple[Path, ..
     from gliderwatch.score.work import version
 
     plots.pyplot()
-    chosen = list(dict.fromkeys(estimators.check(e) for e in names)) or ["adaptive"]
+    chosen = list(dict.fromkeys(estimators.check(e) for e in names)) or [estimators.ALGORITHMS[0]]
     cells = grid.cells(grid.load_grid(name), missions)
     if not cells:
         raise GliderwatchError(f"the grid {name} is empty: give it faults, healthy gliders, or a --mission")

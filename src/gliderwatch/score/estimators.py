@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,8 +14,8 @@ from gliderwatch.config.document import read
 from gliderwatch.config.loading import presets_path
 from gliderwatch.errors import GliderwatchError
 
-ALGORITHMS: Mapping[str, Mapping[str, Any]] = {"adaptive": {}}
-"""Name of each algorithm, and the keys of `estimator:` in the configuration that choose it."""
+ALGORITHMS = ("joint", "composite", "adaptive")
+"""The values of `estimator:`, the default first."""
 
 
 def known() -> list[str]:
@@ -34,15 +33,16 @@ def check(name: str) -> str:
 
 @cache
 def configuration(name: str, glider: str, low: float, high: float) -> Config:
-    """The configuration of one glider with an estimator and a normal range of speed (m/s).
+    """The configuration of one glider with an estimator.
 
-    It is read from a file as the pilot's own, so that the score knows no setting that a pilot cannot make.
-    Raises GliderwatchError where there is no such estimator.
+    `joint` learns the normal range of speed as it does where the configuration says nothing; the others are
+    given it (m/s), as good as a pilot could know it. It is read from a file as the pilot's own, so that the
+    score knows no setting that a pilot cannot make. Raises GliderwatchError where there is no such estimator.
     """
     algorithm, _, preset = check(name).partition(":")
-    settings: dict[str, Any] = {"normal_speed": {"min": round(low, 4), "max": round(high, 4)}}
-    if ALGORITHMS[algorithm]:
-        settings["estimator"] = dict(ALGORITHMS[algorithm])
+    settings: dict[str, Any] = {"estimator": algorithm}
+    if algorithm != "joint":
+        settings["normal_speed"] = {"min": round(low, 4), "max": round(high, 4)}
     if preset:
         settings["preset"] = preset
     document = {"dockserver": {"roots": ["."]}, "gliders": {glider: settings}}

@@ -18,7 +18,7 @@ from gliderwatch.simulate.fleet import fleet
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Mission, Scenario
 from gliderwatch.simulate.scenarios import fault_line, find, load
-from gliderwatch.simulate.truth import netcdf, write_truth
+from gliderwatch.simulate.truth import write_truth
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,6 @@ def gliders(
 
 def run(job: Job) -> None:
     """Do it, and say what was done. Raises `GliderwatchError` where a glider cannot fly."""
-    netcdf()
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     console, is_seen = Console(stderr=True), sys.stderr.isatty()
     with Progress(*columns, console=console, transient=True, disable=not is_seen) as progress:

@@ -6,12 +6,10 @@ import json
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from gliderwatch.errors import GliderwatchError
 from gliderwatch.simulate.delivery import make_calls
 from gliderwatch.simulate.faults import FaultKind
 from gliderwatch.simulate.scenario import DiveTruth, Mission
@@ -65,26 +63,8 @@ def _reported(dive: DiveTruth) -> tuple[float, float]:
     return dive.reported if dive.reported is not None else (np.nan, np.nan)
 
 
-def netcdf() -> ModuleType:
-    """The library that writes NetCDF.
-
-    Raises `GliderwatchError` where it is not installed.
-    """
-    try:
-        import netCDF4  # noqa: PLC0415 (only simulations need it)
-    except ImportError:
-        raise GliderwatchError(
-            "the truth is written as NetCDF, and the package for it is not installed:"
-            " pip install 'gliderwatch[simulate]'"
-        ) from None
-    return netCDF4
-
-
 def write_truth(folder: Path, missions: Sequence[Mission]) -> tuple[Path, Path]:
-    """Write `truth.nc`, one row a dive, and `truth.json`, the faults and artefacts; their paths.
-
-    Raises `GliderwatchError` without the library for NetCDF.
-    """
+    """Write `truth.nc`, one row a dive, and `truth.json`, the faults and artefacts; their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     table, facts = folder / "truth.nc", folder / "truth.json"
     _write_table(table, missions)
@@ -95,9 +75,10 @@ def write_truth(folder: Path, missions: Sequence[Mission]) -> tuple[Path, Path]:
 
 def _write_table(path: Path, missions: Sequence[Mission]) -> None:
     """A contiguous ragged array of trajectories (CF 1.11, 9.3.3): a glider is one, a dive one row of it."""
-    library = netcdf()
+    import netCDF4  # noqa: PLC0415 (slow to load, and only simulations need it)
+
     dives = [dive for mission in missions for dive in mission.truth]
-    with library.Dataset(path, "w", format="NETCDF3_64BIT_OFFSET") as file:
+    with netCDF4.Dataset(path, "w", format="NETCDF3_64BIT_OFFSET") as file:
         file.setncatts(
             {
                 "Conventions": "CF-1.11",
@@ -109,13 +90,13 @@ def _write_table(path: Path, missions: Sequence[Mission]) -> None:
         file.createDimension("glider", len(missions))
         file.createDimension("dive", len(dives))
         file.createDimension("bounds", 2)
-        _write_text(library, file, "glider_name", "glider", [m.scenario.glider for m in missions]).setncatts(
+        _write_text(file, "glider_name", "glider", [m.scenario.glider for m in missions]).setncatts(
             {"long_name": "name of the glider", "cf_role": "trajectory_id"}
         )
         rows = file.createVariable("row_size", "i4", ("glider",))
         rows.setncatts({"long_name": "number of dives", "sample_dimension": "dive", "units": "1"})
         rows[:] = [len(mission.truth) for mission in missions]
-        _write_text(library, file, "segment", "dive", [d.segment for d in dives]).setncatts(
+        _write_text(file, "segment", "dive", [d.segment for d in dives]).setncatts(
             {"long_name": "full name of the segment of the dive", "coordinates": "time lat lon"}
         )
         for variable in _VARIABLES:
@@ -123,11 +104,13 @@ def _write_table(path: Path, missions: Sequence[Mission]) -> None:
         _write_flags(file, dives)
 
 
-def _write_text(library: ModuleType, file: Any, name: str, dimension: str, words: list[str]) -> Any:
+def _write_text(file: Any, name: str, dimension: str, words: list[str]) -> Any:
+    from netCDF4 import stringtochar  # noqa: PLC0415
+
     length = max(map(len, words), default=1)
     file.createDimension(f"{name}_length", length)
     variable = file.createVariable(name, "S1", (dimension, f"{name}_length"))
-    variable[:] = library.stringtochar(np.array(words, dtype=f"S{length}"))
+    variable[:] = stringtochar(np.array(words, dtype=f"S{length}"))
     return variable
 
 

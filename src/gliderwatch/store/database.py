@@ -9,8 +9,30 @@ from pathlib import Path
 
 from gliderwatch.errors import GliderwatchError
 
-SCHEMA = 1
-MIGRATIONS: dict[int, str] = {}
+SCHEMA = 2
+MIGRATIONS: dict[int, str] = {
+    2: """
+CREATE TABLE expected (           -- the next surfacing, as expected after each segment
+    glider    TEXT NOT NULL,
+    segment   TEXT NOT NULL,
+    opened_at REAL NOT NULL,
+    after     REAL NOT NULL,      -- the surfacing that it rests upon
+    data      TEXT NOT NULL,
+    PRIMARY KEY (glider, segment)
+) STRICT;
+CREATE INDEX expected_in_order ON expected (glider, after, opened_at);
+CREATE TABLE heard (              -- signs of life: every segment of which a file came, read or not
+    glider    TEXT NOT NULL,
+    segment   TEXT NOT NULL,
+    opened_at REAL NOT NULL,      -- by the glider's clock
+    last_t    REAL,               -- its last sample; NULL where it is not read
+    at        REAL NOT NULL,      -- when the first file of it came
+    PRIMARY KEY (glider, segment)
+) STRICT;
+CREATE INDEX heard_in_order ON heard (glider, opened_at);
+UPDATE segments SET checkpoint = NULL;  -- a glider's next file has it estimated anew, from all its segments
+""",
+}
 """SQL that leads from the schema before to the one of the key. A state file is never written by an older
 gliderwatch than the one that migrated it."""
 MEMORY = ":memory:"
@@ -74,9 +96,10 @@ def _check_version(version: int, path: Path | str) -> None:
 def _migrate(connection: sqlite3.Connection, path: Path | str) -> None:
     version = connection.execute("PRAGMA user_version").fetchone()[0]
     _check_version(version, path)
-    steps = [MIGRATIONS[v] for v in range(version + 1, SCHEMA + 1)] if version else [schema()]
     if version == SCHEMA:
         return
+    steps = [] if version else [schema()]
+    steps += [MIGRATIONS[v] for v in range(max(version, 1) + 1, SCHEMA + 1)]
     with closing(connection.cursor()) as cursor:
         cursor.executescript(
             "BEGIN IMMEDIATE;\n" + "\n".join(steps) + f"\nPRAGMA user_version = {SCHEMA};\nCOMMIT;"
@@ -84,5 +107,5 @@ def _migrate(connection: sqlite3.Connection, path: Path | str) -> None:
 
 
 def schema() -> str:
-    """The SQL of the schema."""
+    """The SQL of schema 1, before all migrations."""
     return files("gliderwatch.store").joinpath("schema.sql").read_text(encoding="utf-8")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 
@@ -19,7 +19,10 @@ class Status(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class File:
-    """A row of the ledger: ``reason`` says in words why it was not taken, ``crc`` the cache waited for."""
+    """A row of the ledger: ``reason`` says in words why it was not taken, ``crc`` the cache waited for.
+
+    ``opened_at`` (s) of its header is not in the row: it makes the file a sign of life when it is noted.
+    """
 
     path: str
     size: int
@@ -29,6 +32,7 @@ class File:
     segment: str = ""
     reason: str = ""
     crc: str = ""
+    opened_at: float | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

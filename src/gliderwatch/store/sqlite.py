@@ -10,13 +10,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
-from gliderwatch.model import Alert, Assessment, Incident, Segment, SegmentId
+from gliderwatch.model import Alert, Assessment, Expected, Incident, Segment, SegmentId
 from gliderwatch.navigation.quality import NOT_SURFACED
 from gliderwatch.navigation.samples import compact
 from gliderwatch.pipeline import GliderState, Outcome
 from gliderwatch.rules.announce import Said
+from gliderwatch.rules.silence import Sign
 from gliderwatch.store import codec
 from gliderwatch.store.database import connect, read_only
+from gliderwatch.store.known import Known
 from gliderwatch.store.rows import File, Status, Undelivered, file_of
 
 __all__ = ["File", "Known", "Status", "Store", "Undelivered"]
@@ -149,11 +151,16 @@ class Store:
         return codec.decode(row[0], Segment)
 
     def checkpoint(self, identity: SegmentId, state: GliderState) -> None:
-        """Keep the state after a segment."""
+        """Keep the state after a segment, and the surfacing that it leads to expect."""
+        key = (identity.glider, identity.name)
         self._db.execute(
             "UPDATE segments SET checkpoint = ? WHERE glider = ? AND name = ?",
-            (codec.encode(state), identity.glider, identity.name),
+            (codec.encode(state), *key),
         )
+        self._db.execute("DELETE FROM expected WHERE glider = ? AND segment = ?", key)
+        if (e := state.memory.expected) is not None:
+            row = (*key, identity.opened_at, e.after, codec.plain_encode(e))
+            self._db.execute("INSERT INTO expected VALUES (?, ?, ?, ?, ?)", row)
 
     def thin(self, glider: str) -> None:
         """Let go of the checkpoints that are not among the `RECENT` newest, but for one in `SPARSE`."""
@@ -183,6 +190,15 @@ class Store:
             [(i.id, glider, i.opened_at, i.cleared_at, codec.plain_encode(i)) for i in outcome.incidents],
         )
 
+    def hear(self, identity: SegmentId, last_t: float | None, now: float) -> None:
+        """Note a sign of life: a file of a segment came, with its last sample (s) if it was read."""
+        self._db.execute(
+            "INSERT INTO heard VALUES (?, ?, ?, ?, ?) ON CONFLICT (glider, segment) DO UPDATE SET "
+            "opened_at = excluded.opened_at, at = min(at, excluded.at), "
+            "last_t = max(coalesce(last_t, excluded.last_t), coalesce(excluded.last_t, last_t))",
+            (identity.glider, identity.name, identity.opened_at, last_t, now),
+        )
+
     def assessments(self, glider: str) -> list[Assessment]:
         """All of a glider, in order of time."""
         return self._all(
@@ -196,7 +212,7 @@ class Store:
         )
 
     def known(self, glider: str) -> Known:
-        """What is known of a glider, for `rules.announce`."""
+        """What is known of a glider, for the rules."""
         return Known(self, glider)
 
     def dive(self, glider: str, t_dive: float) -> Assessment | None:
@@ -211,6 +227,25 @@ class Store:
             "ORDER BY t_surface DESC LIMIT 1"
         )
         return next(iter(self._all(sql, (glider, until), Assessment)), None)
+
+    def expected(self, glider: str, until: float) -> Expected | None:
+        """What was expected after the last surfacing at `until` (s) or before."""
+        sql = (
+            "SELECT data FROM expected WHERE glider = ? AND after <= ? "
+            "ORDER BY after DESC, opened_at DESC LIMIT 1"
+        )
+        return next(iter(self._all(sql, (glider, until), Expected)), None)
+
+    def first_surfacing(self, glider: str, after: float) -> float | None:
+        """The first surfacing later than `after` (s)."""
+        sql = "SELECT min(t_surface) FROM assessments WHERE glider = ? AND ended = 1 AND t_surface > ?"
+        found: float | None = self._db.execute(sql, (glider, after)).fetchone()[0]
+        return found
+
+    def signs(self, glider: str, since: float) -> tuple[Sign, ...]:
+        """The files of a glider that were opened at `since` (s) or later."""
+        sql = "SELECT opened_at, last_t, at FROM heard WHERE glider = ? AND opened_at >= ?"
+        return tuple(Sign(*row) for row in self._db.execute(sql, (glider, since)))
 
     def gliders(self) -> list[str]:
         """The gliders of which segments are held."""
@@ -269,22 +304,3 @@ class Store:
 
     def _all(self, sql: str, values: tuple[object, ...], kind: type[T]) -> list[T]:
         return [codec.plain_decode(row[0], kind) for row in self._db.execute(sql, values)]
-
-
-class Known:
-    """`rules.announce.Known` of one glider."""
-
-    def __init__(self, store: Store, glider: str) -> None:
-        self._store, self._glider = store, glider
-
-    def incidents(self) -> tuple[Incident, ...]:
-        """All its incidents."""
-        return tuple(self._store.incidents(self._glider))
-
-    def dive(self, t_dive: float) -> Assessment | None:
-        """The dive that began at a time (s)."""
-        return self._store.dive(self._glider, t_dive)
-
-    def last_surfacing(self, until: float) -> Assessment | None:
-        """The last dive that has ended with a fix and surfaced at `until` (s) or before."""
-        return self._store.last_surfacing(self._glider, until)

@@ -1,0 +1,248 @@
+"""Forecasts of the current one dive ahead, on real missions and in simulated seas.
+
+python benchmarks/currents.py [--missions ../shared/data] [--gliders 3] [--days 20]
+
+Dives come from files, as in `joint.py`; currents that the joint estimator calls wrong are left out. Errors
+are those of a component, of all dives after the first.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from common import machine
+from flights import HOUR, SEAS, judged, navigated, of, read
+
+from gliderwatch.currents import augmented, two_stage
+from gliderwatch.currents.augmented import Parameters
+from gliderwatch.currents.constituents import Constituent
+from gliderwatch.currents.state import Currents, displacement, forecasts, learn, predict
+from gliderwatch.currents.two_stage import TwoStageParams
+from gliderwatch.estimation.observation import observe
+from gliderwatch.model import Array, Dive, readonly
+from gliderwatch.simulate import ocean
+from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.simulate.glider import simulate
+from gliderwatch.simulate.ocean import Ellipse, Sea
+from gliderwatch.simulate.scenario import Scenario
+from gliderwatch.store import codec
+
+TIDE = ocean.Constituent
+MORE = {
+    "no tides": Sea(tides=()),
+    "springs and neaps": Sea(
+        tides=(
+            Ellipse(TIDE.M2, 0.25, 0.08, 0.6, 0.4),
+            Ellipse(TIDE.S2, 0.10, 0.03, 0.6, 1.4),
+            Ellipse(TIDE.N2, 0.05, 0.01, 0.6, 2.4),
+            Ellipse(TIDE.K1, 0.10, -0.03, 1.2, 2.0),
+            Ellipse(TIDE.O1, 0.07, -0.03, 1.2, 0.3),
+        ),
+        sigma=0.05,
+    ),
+}
+M2_K1 = (Constituent.M2, Constituent.K1)
+FIXED = Parameters(
+    readonly([0.08]),
+    readonly([30 * HOUR]),
+    readonly([[1e-6 / HOUR] * 2]),
+    readonly([[0.25] * 2]),
+    readonly([each.omega for each in M2_K1]),
+)
+INSIDE = 5.991
+"""95 % of chi-square with 2 degrees of freedom."""
+NAMES = ("persistence", "two-stage", "two-stage 119 h", "fixed", "residual", "tides", "chosen")
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A dive's interval (s), its believed current (m/s) with error, and the true one where it is known."""
+
+    start: float
+    end: float
+    current: Array
+    sigma: float
+    truth: Array | None
+
+
+@dataclass(frozen=True)
+class Row:
+    """One dive: error (m/s, (2,)) of each forecast, the chosen one's source, its error squared in standard
+    errors; of the displacement over the dive the error of persistence and of `displacement` (m, as over 3 h)
+    and that squared in standard errors."""
+
+    errors: dict[str, Array]
+    source: str
+    nis: float
+    metres: tuple[float, float]
+    spread: float
+
+
+def seen(dives: Sequence[Dive], truth: dict[float, Array] | None = None) -> list[Seen]:
+    out = []
+    for dive, verdict in zip(dives, judged(dives), strict=True):
+        if dive.current is None or dive.track is None or verdict.info is None or verdict.info.cause.is_error:
+            continue
+        each = observe(dive)
+        assert each.current is not None
+        known = truth.get(dive.t_dive) if truth is not None else None
+        if truth is None or known is not None:
+            out.append(Seen(each.start, each.end, each.current, each.current_sigma, known))
+    return out
+
+
+def simulated(sea: Sea, seed: int, days: float) -> list[Seen]:
+    mission = simulate(Scenario(seed=seed, days=days, sea=sea))
+    with tempfile.TemporaryDirectory(prefix="gliderwatch-benchmark-") as folder:
+        write_mission(Path(folder) / "gliders", Path(folder) / "cache", mission)
+        dives = navigated(read(Path(folder) / "gliders", Path(folder) / "cache"))
+    truth = {d.t_dive: np.array(same.current) for d in dives if (same := of(d, mission.truth)) is not None}
+    return seen(dives, truth)
+
+
+class TwoStage:
+    """The two-stage filter as a forecast."""
+
+    def __init__(self, params: TwoStageParams) -> None:
+        self.params, self.state = params, None
+
+    def __call__(self, each: Seen) -> Array | None:
+        told = (
+            two_stage.forecast(self.state, each.start, each.end, self.params)
+            if self.state is not None
+            else None
+        )
+        step = (each.start, each.end, each.current)
+        self.state = (
+            two_stage.learn(self.state, *step, 0.02, self.params)
+            if self.state is not None
+            else two_stage.init(*step, self.params)
+        )
+        return told
+
+
+class Fixed:
+    """The augmented filter with fixed parameters as a forecast."""
+
+    def __init__(self) -> None:
+        self.belief = None
+
+    def __call__(self, each: Seen) -> Array:
+        belief = self.belief if self.belief is not None else augmented.init(each.start, FIXED)
+        step = (max(each.start, belief.t), each.end, each.current, each.sigma)
+        self.belief, told = augmented.learn(belief, *step, FIXED)
+        return told.mean[0]
+
+
+def rows(dives: Sequence[Seen]) -> tuple[list[Row], float]:
+    """What was foretold of each dive, and how long it took to learn a dive (s)."""
+    others: dict[str, Callable[[Seen], Array | None]] = {
+        "two-stage": TwoStage(TwoStageParams(constituents=M2_K1)),
+        "two-stage 119 h": TwoStage(TwoStageParams(cutoff=1 / (119.4 * HOUR), constituents=M2_K1)),
+        "fixed": Fixed(),
+    }
+    state, out, cost = Currents(), [], 0.0
+    for each in dives:
+        told = {name: forecast(each) for name, forecast in others.items()}
+        found, best = forecasts(state, each.start, each.end), predict(state, each.start, each.end)
+        moved = displacement(state, each.start, each.end)
+        if found is not None and best is not None and moved is not None:
+            told |= {name: mixture.mean for name, mixture in found.items()} | {"chosen": best.flow}
+            out.append(row(each, told, best.source, best.cov, moved.x, moved.cov))
+        begun = time.process_time()
+        state = learn(state, each.start, each.end, each.current, each.sigma)
+        cost += time.process_time() - begun
+    return out, cost / max(len(dives), 1)
+
+
+def row(each: Seen, told: dict[str, Array | None], source: str, cov: Array, x: Array, x_cov: Array) -> Row:
+    lasts = each.end - each.start
+    miss = {name: each.current - mean for name, mean in told.items() if mean is not None}
+    e = miss["chosen"]
+    nis = float(e @ np.linalg.solve(cov + each.sigma**2 * np.eye(2), e))
+    # where the truth is not known the reported current stands for it, with its error
+    water = each.truth if each.truth is not None else each.current
+    noise = 0.0 if each.truth is not None else each.sigma
+    off = x - water * lasts
+    last = told["persistence"]
+    assert last is not None
+    spread = float(off @ np.linalg.solve(x_cov + (noise * lasts) ** 2 * np.eye(2), off))
+    scale = 3 * HOUR / lasts
+    metres = (float(np.hypot(*(last - water))) * 3 * HOUR, float(np.hypot(*off)) * scale)
+    return Row(miss, source, nis, metres, spread)
+
+
+def line(name: str, found: Sequence[Row], cost: float) -> str:
+    def rms(forecast: str) -> float:
+        return 100 * float(np.sqrt(np.mean([r.errors[forecast] ** 2 for r in found])))
+
+    on = np.mean([r.source.startswith("tides") for r in found])
+    inside = np.mean([r.nis < INSIDE for r in found])
+    spread = np.mean([r.spread < INSIDE for r in found])
+    metres = np.mean([r.metres for r in found], axis=0)
+    errors = " ".join(f"{rms(forecast):6.2f}" for forecast in NAMES)
+    return (
+        f"{name:22s} {len(found):5d} {errors} {on:5.0%} {inside:7.0%} "
+        f"{metres[0]:6.0f} {metres[1]:6.0f} {spread:6.0%} {1e3 * cost:5.2f}"
+    )
+
+
+def better(found: Sequence[Row]) -> str:
+    """By how many standard errors each forecast's squared errors are below those of persistence."""
+    out = []
+    for name in NAMES[1:]:
+        gain = [np.sum(r.errors["persistence"] ** 2 - r.errors[name] ** 2) for r in found]
+        out.append(f"{name} {np.mean(gain) / np.std(gain) * np.sqrt(len(gain)):+.1f}")
+    return "better than persistence by standard errors: " + ", ".join(out)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--missions", type=Path, default=Path(__file__).parents[2] / "shared" / "data")
+    parser.add_argument("--gliders", type=int, default=3, help="in each sea")
+    parser.add_argument("--days", type=float, default=20)
+    arguments = parser.parse_args()
+    print(machine())
+    print(
+        "rms error of the current one dive ahead (cm/s, a component); on how many dives tides are on; how\n"
+        "many are in the 95 % ellipse of the chosen forecast; error of the displacement in 3 h (m) of\n"
+        "persistence and chosen, against the true current where it is known, and how many are in its 95 %\n"
+        "ellipse; time to learn a dive (ms)\n"
+        f"{'':22s} dives   last   2-st  2-119  fixed resid.  tides chosen    on  inside   last chosen inside"
+        "    ms"
+    )
+    every: list[Row] = []
+    if arguments.missions.is_dir():
+        for mission in sorted(p for p in arguments.missions.iterdir() if (p / "from-glider").is_dir()):
+            found, cost = rows(seen(navigated(read(mission / "from-glider", mission / "cache"))))
+            every += found
+            print(line(mission.name, found, cost))
+        print(line("all real missions", every, 0.0))
+        print(better(every))
+    every, wrong = [], []
+    for name, sea in (SEAS | MORE).items():
+        some: list[Row] = []
+        for seed in range(1, arguments.gliders + 1):
+            dives = simulated(sea, seed, arguments.days)
+            wrong += [each.current - each.truth for each in dives if each.truth is not None]
+            found, cost = rows(dives)
+            some += found
+        every += some
+        print(line(name, some, cost))
+    print(line("all simulated seas", every, 0.0))
+    print(better(every))
+    print(f"a simulated glider's own currents are {100 * np.sqrt(np.mean(np.square(wrong))):.2f} cm/s off")
+    state = Currents()
+    for each in dives:
+        state = learn(state, each.start, each.end, each.current, each.sigma)
+    print(f"a state is {len(codec.encode(state))} bytes in a checkpoint")
+
+
+if __name__ == "__main__":
+    main()

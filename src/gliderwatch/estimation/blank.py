@@ -1,0 +1,44 @@
+"""What is known of a dive before anything is estimated. Pure."""
+
+from __future__ import annotations
+
+from gliderwatch.model import Assessment, Dive
+from gliderwatch.navigation.track import closure
+from gliderwatch.params import GliderParams
+
+
+def blank(dive: Dive, params: GliderParams, digest: str, reason: str) -> Assessment:
+    """An assessment of a dive with what navigation knows, without a flag and with the reason for that.
+
+    ``digest`` identifies the parameters.
+    """
+    place = dive.end if dive.end is not None else dive.start
+    numbers = dict(dive.evidence)
+    if dive.track is not None and dive.current is not None:
+        numbers |= closure(dive.track, dive.current)
+    return Assessment(
+        glider=dive.glider,
+        segment=dive.segment,
+        t_dive=dive.t_dive,
+        t_surface=dive.t_surface,
+        lat=place.lat if place is not None else None,
+        lon=place.lon if place is not None else None,
+        flag=None,
+        reason=reason,
+        speed=None,
+        speed_min=params.speed_min,
+        speed_max=params.speed_max,
+        flow_u=None,
+        flow_v=None,
+        reference_u=dive.current.u if dive.current else None,
+        reference_v=dive.current.v if dive.current else None,
+        reference_final=dive.current is not None and dive.current.final,
+        p_e=None,
+        gamma_f=params.gamma_f,
+        clle_max=None,
+        excitation=None,
+        n_samples=dive.n_samples,
+        evidence=numbers,
+        notes=dive.notes,
+        parameters=digest,
+    )

@@ -1,0 +1,1 @@
+"""Where and when a glider comes up next. Pure."""

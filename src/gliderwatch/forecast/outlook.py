@@ -1,0 +1,57 @@
+"""What the estimator of a glider expects of its next dive: speed and flow. Pure."""
+
+from __future__ import annotations
+
+from math import expm1, sin
+
+import numpy as np
+
+from gliderwatch.estimation.ahead import mean_flow
+from gliderwatch.estimation.flow import FlowParams
+from gliderwatch.estimation.glider import Estimate
+from gliderwatch.estimation.joint import JointParams, JointState
+from gliderwatch.estimation.measurement import OWN, SLIP
+from gliderwatch.estimation.observation import DRAG_BY_LIFT, USUAL_PITCH
+from gliderwatch.forecast.surfacing import Flow
+from gliderwatch.model import Array
+
+Outlook = tuple[float, float, Flow]
+"""Speed through the water and its standard error (m/s), and the forecast of the flow."""
+VAGUE = 0.1
+"""Part of the speed: its error where an estimator gives none."""
+PHYSICAL = JointParams().slip * DRAG_BY_LIFT / sin(USUAL_PITCH) ** 2
+"""Part of the own speed that the angle of attack takes at the usual pitch, beside the slip of the state."""
+PASSING, MEMORY = 0.08, 30 * 3600.0
+"""Size (m/s, a component) and time constant (s) of what changes of a current from dive to dive."""
+
+
+def look_ahead(estimate: Estimate, over_ground: Array | None) -> Outlook | None:
+    """Speed and flow to be expected after the last dive used; None before the first.
+
+    ``over_ground`` (m/s, (2,)) is how it went then: a strong current differs along the way.
+    """
+    joint, learner = estimate.joint.speed.joint, estimate.learner
+    if joint is not None:
+        return _of_joint(joint, np.zeros(2) if over_ground is None else over_ground)
+    if learner.learner is None or learner.current is None:
+        return None
+    current, t = np.array([learner.current.u, learner.current.v]), learner.current_t
+
+    def flow(start: float, end: float) -> tuple[Array, Array]:
+        left = max((start + end) / 2 - t, 0.0) / MEMORY
+        return current, -(PASSING**2) * expm1(-2 * left) * np.eye(2)
+
+    speed = learner.learner.speed
+    return speed, VAGUE * abs(speed), flow
+
+
+def _of_joint(joint: JointState, over_ground: Array) -> Outlook:
+    own, params = float(joint.x[OWN]), FlowParams()
+    left = 1 - PHYSICAL - float(joint.x[SLIP])
+    slope = np.zeros(len(joint.x))
+    slope[[OWN, SLIP]] = left, -own
+
+    def flow(start: float, end: float) -> tuple[Array, Array]:
+        return mean_flow(joint, params, over_ground, start, end)
+
+    return own * left, float(slope @ joint.cov @ slope) ** 0.5, flow

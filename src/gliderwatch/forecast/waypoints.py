@@ -1,0 +1,38 @@
+"""Which waypoint a glider was bound for when it came up. Pure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gliderwatch.forecast.state import Place
+from gliderwatch.model import Segment
+
+Heard = tuple[tuple[float, float, float], ...]
+"""Waypoints as they were told: time (s), latitude and longitude (degrees), in order of time."""
+
+KEPT = 32
+"""Reports that are remembered: a corrected dive asks for the waypoint of some hours ago."""
+LATE = 300.0
+"""Seconds after a fix in which a file that ends with it may still tell the waypoint."""
+
+
+def heard(known: Heard, segment: Segment) -> Heard:
+    """The waypoints told until now and those in one more segment; what changes nothing is left out."""
+    lat, lon = segment.get("waypoint_lat"), segment.get("waypoint_lon")
+    t, i, j = np.intersect1d(lat.t, lon.t, return_indices=True)
+    told = zip(t.tolist(), lat.v[i].tolist(), lon.v[j].tolist(), strict=True)
+    out: list[tuple[float, float, float]] = []
+    for report in sorted({*known, *told}):
+        if not out or report[1:] != out[-1][1:]:
+            out.append(report)
+    return tuple(out[-KEPT:])
+
+
+def bound_for(known: Heard, t: float) -> Place | None:
+    """The waypoint at a fix at time ``t`` (s), of those told; None before any.
+
+    >>> bound_for(((0.0, 27.0, -84.0), (9000.0, 27.5, -84.0)), 8000.0)
+    (27.0, -84.0)
+    """
+    before = [(lat, lon) for told, lat, lon in known if told <= t + LATE]
+    return before[-1] if before else None

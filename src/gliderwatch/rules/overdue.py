@@ -1,0 +1,177 @@
+"""What people have been told of a glider's silence, compared with what is known. Pure.
+
+`hear` after an input: who was told that a glider is overdue is told that it called. `tick` as time goes by:
+a glider that stays away is told, and brought to mind at growing intervals. Both look at what is known, not
+at what changed, so that nothing is said twice and the order of arrival does not matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from gliderwatch.alerts import overdue as message
+from gliderwatch.alerts.overdue import Absence, Fleet
+from gliderwatch.model import Alert, Assessment, Expected, Incident, Severity
+from gliderwatch.rules.silence import (
+    GONE,
+    Awaited,
+    Sign,
+    awaited,
+    drift,
+    first_call,
+    guess,
+    is_at_sea,
+    severity,
+)
+
+LATE = 900.0
+"""Seconds: a message made later than that after its time tells of now (the service was off), an earlier one
+of its time, so that live and replay say the same."""
+RECENT = GONE + 2 * 86400.0
+"""Seconds: files opened before are no sign of life of the last 30 days."""
+
+
+@dataclass(frozen=True, slots=True)
+class Silence:
+    """The messages of one silence: the call that was ``awaited``, how often it was ``told`` to be overdue,
+    ``messages`` so far; ``called`` when it was heard again (s), ``withdrawn`` if that was in time."""
+
+    id: str
+    awaited: Awaited
+    told: int
+    messages: int
+    called: float | None = None
+    withdrawn: bool = False
+
+
+class Known(Protocol):
+    """What is known of one glider now; the store answers."""
+
+    glider: str
+
+    def incidents(self) -> tuple[Incident, ...]:
+        """All its incidents."""
+
+    def last_surfacing(self, until: float) -> Assessment | None:
+        """The last dive that has ended with a fix and surfaced at `until` (s) or before."""
+
+    def expected(self, until: float) -> Expected | None:
+        """What was expected after the last surfacing at `until` (s) or before."""
+
+    def first_surfacing(self, after: float) -> float | None:
+        """The first surfacing later than `after` (s)."""
+
+    def signs(self, since: float) -> tuple[Sign, ...]:
+        """Its files that were opened at `since` (s) or later."""
+
+
+def hear(silences: tuple[Silence, ...], known: Known, now: float) -> tuple[tuple[Silence, ...], list[Alert]]:
+    """All-clears and corrections for silences that have ended, as known at `now` (s)."""
+    out, alerts = [], list[Alert]()
+    for before in silences:
+        silence, alert = _heard(before, known, now)
+        out.append(silence)
+        alerts += [alert] if alert is not None else []
+    return tuple(out), alerts
+
+
+def _heard(before: Silence, known: Known, now: float) -> tuple[Silence, Alert | None]:
+    if before.withdrawn:
+        return before, None
+    call = before.awaited
+    at = first_call(call, known.signs(call.heard - RECENT), known.first_surfacing(call.heard), now)
+    if at is None or (before.called is not None and at > call.due):
+        return before, None
+    silence = replace(before, messages=before.messages + 1, called=at, withdrawn=at <= call.due)
+    identity, to = f"{before.id}/{before.messages}", _audience(before)
+    if silence.withdrawn:
+        return silence, message.withdrawn(
+            known.glider, call.due, at, now, alert_id=identity, thread=before.id, to=to
+        )
+    dive = known.last_surfacing(now)
+    return silence, message.called(
+        known.glider, call.heard, at, dive, alert_id=identity, thread=before.id, to=to
+    )
+
+
+def _audience(silence: Silence) -> Severity:
+    return severity(silence.told - 1)
+
+
+def tick(
+    silences: tuple[Silence, ...], known: Known, fleet: Fleet, overdue_hours: float | None, now: float
+) -> tuple[tuple[Silence, ...], list[Alert]]:
+    """As `hear`, and what has become due by `now` (s)."""
+    silences, alerts = hear(silences, known, now)
+    silence = _going_on(silences, known, overdue_hours, now)
+    if silence is None or now - silence.awaited.heard >= GONE:
+        return silences, alerts
+    stages = silence.awaited.stages(now)
+    if stages <= silence.told:
+        return silences, alerts
+    since = silence.awaited.stage(stages - 1)
+    absence = _absence(silence.awaited, known, fleet, since if now - since < LATE else now)
+    alert = message.overdue(
+        absence,
+        alert_id=f"{silence.id}/{silence.messages}",
+        thread=silence.id,
+        severity=severity(stages - 1),
+        first=silence.messages == 0,
+    )
+    told = replace(silence, told=stages, messages=silence.messages + 1)
+    kept = (s for s in silences if s.id != silence.id and (s.called is None or now - s.called < GONE))
+    return (*kept, told), [*alerts, alert]
+
+
+def next_tick(
+    silences: tuple[Silence, ...], known: Known, overdue_hours: float | None, now: float
+) -> float | None:
+    """When `tick` has something to say next (s) if nothing is heard until then; None: never."""
+    silence = _going_on(silences, known, overdue_hours, now)
+    return None if silence is None else silence.awaited.stage(silence.told)
+
+
+def _going_on(
+    silences: tuple[Silence, ...], known: Known, overdue_hours: float | None, now: float
+) -> Silence | None:
+    """The silence that goes on, told or not; None where no call is awaited."""
+    told = next((s for s in silences if s.called is None), None)
+    if told is not None:
+        return told
+    signs = known.signs(now - RECENT)
+    expected = known.expected(now) or guess(signs, now)
+    if expected is None:
+        return None
+    call = awaited(expected, signs, now, overdue_hours)
+    if not is_at_sea(signs, call.interval, now):
+        return None
+    identity, taken = f"{known.glider}/overdue/{call.heard:.0f}", {s.id for s in silences}
+    while identity in taken:
+        identity += "+"
+    return Silence(identity, call, 0, 0)
+
+
+def _absence(call: Awaited, known: Known, fleet: Fleet, now: float) -> Absence:
+    expected, last = known.expected(call.heard), known.last_surfacing(now)
+    if expected is None:
+        expected = Expected(call.heard, call.t, 0.0, None, None, 0.0, 0.0, 0.0, "")
+    place = _both(last.lat, last.lon) if last is not None else None
+    flow = _both(*message.current(last)) if last is not None else None
+    foreseen = expected if call.heard <= expected.after + call.interval / 2 else None
+    return Absence(
+        glider=known.glider,
+        now=now,
+        heard=call.heard,
+        awaited=call.t,
+        lat=foreseen.lat if foreseen is not None else None,
+        lon=foreseen.lon if foreseen is not None else None,
+        area=drift(expected, place, flow, now),
+        last=last,
+        incidents=tuple(i for i in known.incidents() if i.cleared_at is None),
+        fleet=fleet,
+    )
+
+
+def _both(a: float | None, b: float | None) -> tuple[float, float] | None:
+    return None if a is None or b is None else (a, b)
