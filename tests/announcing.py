@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from alert_support import SLOW
-from gliderwatch.model import Alert, Assessment, Incident
+from gliderwatch.model import Alert, Assessment, Expected, Incident
 from gliderwatch.params import RuleParams
 from gliderwatch.rules.announce import Said, due
 from gliderwatch.rules.incident import Watches, judge
@@ -30,6 +30,7 @@ class World:
 
     dives: dict[float, Assessment]
     rules: RuleParams = RuleParams()
+    next: Expected | None = None
 
     @classmethod
     def of(cls, letters: str, rules: RuleParams | None = None) -> World:
@@ -48,6 +49,10 @@ class World:
     def dive(self, t_dive: float) -> Assessment | None:
         """The dive that began at a time."""
         return self.dives.get(t_dive)
+
+    def expected(self, until: float) -> Expected | None:
+        """The next surfacing, where the test gives one."""
+        return self.next
 
     def last_surfacing(self, until: float) -> Assessment | None:
         """The last dive that surfaced until a time."""

@@ -19,7 +19,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("score")
     done = command("score", "--grid", "small", "--out", out)
     assert done.returncode == 0, done.stderr
-    assert "adaptive: faults of simulated gliders" in done.stdout
+    assert "joint: faults of simulated gliders" in done.stdout
     return out
 
 
@@ -59,7 +59,7 @@ def test_the_page_needs_nothing_else(small: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("--estimator", "guess"), "known are: adaptive"),
+        (("--estimator", "guess"), "known are: joint"),
         (("--grid", "huge"), "there is no grid huge"),
     ],
 )

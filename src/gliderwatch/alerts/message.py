@@ -10,7 +10,7 @@ from __future__ import annotations
 from gliderwatch.alerts.evidence import checks, difference, how_sure, out_of_range, weigh
 from gliderwatch.alerts.page import Page
 from gliderwatch.alerts.words import UNKNOWN, clean, duration, flow, known, map_link, place, speed, utc
-from gliderwatch.model import Alert, Assessment, Flag, Incident, Kind, Severity
+from gliderwatch.model import Alert, Assessment, Expected, Flag, Incident, Kind, Severity
 
 NAMES = {Kind.ANOMALY: "anomaly", Kind.FALSE_ALARM: "false alarm"}
 
@@ -130,11 +130,21 @@ def correction(
 
 
 def surfacing(
-    assessment: Assessment, previous: float | None, *, alert_id: str, audience: Severity = Severity.INFO
+    assessment: Assessment,
+    previous: float | None,
+    *,
+    alert_id: str,
+    expected: Expected | None = None,
+    audience: Severity = Severity.INFO,
 ) -> Alert:
-    """The notice of one surfacing; `previous` is the time of the surfacing before (s)."""
+    """The notice of one surfacing; `previous` is the time of the one before (s), `expected` the next."""
     a = assessment
-    after = () if previous is None else (("After the one before", duration(a.t_surface - previous)),)
+    after: tuple[tuple[str, str], ...] = ()
+    if previous is not None:
+        after = (("After the one before", duration(a.t_surface - previous)),)
+    if expected is not None:
+        when = f"{utc(expected.t)}, within {duration(1.96 * expected.t_sigma)} (95 %)"
+        after += (("Next surfacing", f"{when}, {place(expected.lat, expected.lon)}"),)
     page = Page(
         (f"{_glider(a)} surfaced {utc(a.t_surface)}: {flag_words(a)}.",),
         (*after, *_facts(a, 0)),

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from gliderwatch.alerts import message
-from gliderwatch.model import Alert, Assessment, Incident
+from gliderwatch.model import Alert, Assessment, Expected, Incident
 from gliderwatch.rules.overdue import Silence
 
 NEWS = 86400.0
@@ -55,6 +55,9 @@ class Known(Protocol):
     def dive(self, t_dive: float) -> Assessment | None:
         """The dive that began at a time (s)."""
 
+    def expected(self, until: float) -> Expected | None:
+        """What was expected after the last surfacing at `until` (s) or before."""
+
     def last_surfacing(self, until: float) -> Assessment | None:
         """The last dive that has ended with a fix and surfaced at `until` (s) or before."""
 
@@ -86,7 +89,10 @@ def due(said: Said, known: Known, reminder_hours: float | None, notices: bool) -
         identity = f"{latest.glider}/surfacing/{latest.t_dive:.0f}"
         before_it = known.last_surfacing(latest.t_surface - 1.0)
         previous = before_it.t_surface if before_it is not None else None
-        alerts.append(message.surfacing(latest, previous, alert_id=identity))
+        expected = known.expected(float("inf"))
+        if expected is not None and expected.after < latest.t_surface:
+            expected = None  # of an earlier surfacing: the last dive cannot be used
+        alerts.append(message.surfacing(latest, previous, alert_id=identity, expected=expected))
         surfaced = latest.t_surface
     said = replace(said, threads=tuple(threads), surfaced=surfaced)
     return said, sorted(alerts, key=lambda a: a.time)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 )
 @click.option("--grid", "name", default="default", help="A shipped grid (default, small), or a YAML file.")
 @click.option(
-    "--estimator", "names", multiple=True, help="What to score (adaptive); several are put side by side."
+    "--estimator", "names", multiple=True, help="What to score (joint); several are put side by side."
 )
 @click.option(
     "--mission",

@@ -39,13 +39,29 @@ class DiveResult:
 
 
 @dataclass(frozen=True, slots=True)
+class NextResult:
+    """A forecast of the next surfacing, as first said, beside what came.
+
+    ``late`` (s) by how much it came later, ``miss`` (m) between the places; ``persistence`` (m) the same for
+    the way of the dive before gone once more; whether place and time were within what was to hold 95 %.
+    """
+
+    late: float
+    miss: float
+    persistence: float
+    in_ellipse: bool
+    in_time: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Record:
     """One glider, one estimator.
 
     ``sea`` is the scenario or the real mission, ``fault`` and ``size`` what is wrong with it (`HEALTHY`:
     nothing) since ``onset`` (s), ``seed`` its number. ``usual`` is the healthy speed that the normal range
     ``low`` to ``high`` was set about (m/s). ``surfacings`` are all of its own (s), known on shore or not;
-    ``start`` and ``end`` (s) bound the mission, ``seconds`` is what the replay took.
+    ``start`` and ``end`` (s) bound the mission, ``seconds`` is what the replay took; ``next`` are the
+    forecasts of surfacings before the onset.
     """
 
     estimator: str
@@ -64,6 +80,7 @@ class Record:
     dives: tuple[DiveResult, ...]
     told: tuple[Told, ...]
     seconds: float = 0.0
+    next: tuple[NextResult, ...] = ()
 
     @property
     def glider(self) -> tuple[str, str, int]:

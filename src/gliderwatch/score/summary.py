@@ -20,6 +20,7 @@ from gliderwatch.score.measures import (
 )
 from gliderwatch.score.record import Record
 from gliderwatch.score.speeds import SpeedScore, speed_scores
+from gliderwatch.score.surfacings import NextScore, next_scores
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,7 @@ class Summary:
     faults: tuple[FaultScore, ...]
     false: tuple[FalseScore, ...]
     speeds: tuple[SpeedScore, ...]
+    next: tuple[NextScore, ...]
     roc: tuple[roc.Point, ...]
 
 
@@ -45,6 +47,7 @@ def summarise(records: Sequence[Record], version: str) -> Summary:
         tuple(sorted(fault_scores(order), key=lambda s: (s.is_real, s.estimator, s.sea, s.fault, s.size))),
         tuple(sorted(false_scores(order), key=lambda s: (s.is_real, s.estimator, s.sea == "", s.sea))),
         tuple(sorted(speed_scores(order), key=lambda s: (s.estimator, s.is_faulty, s.sea))),
+        tuple(sorted(next_scores(order), key=lambda s: (s.is_real, s.estimator, s.sea))),
         tuple(roc.points(records)),
     )
 
@@ -55,7 +58,7 @@ def write(path: Path, summary: Summary) -> None:
 
 
 def tables(summary: Summary) -> Iterator[Table]:
-    """Tables of faults, of false messages and of speeds; 80 columns."""
+    """Tables of faults, of false messages, of speeds and of next surfacings; 80 columns."""
     overall = [s for s in summary.faults if s.sea == ""]
     for is_real in (False, True):
         for estimator in dict.fromkeys(s.estimator for s in overall if s.is_real == is_real):
@@ -68,6 +71,9 @@ def tables(summary: Summary) -> Iterator[Table]:
     for estimator in dict.fromkeys(s.estimator for s in summary.speeds):
         title = f"{estimator}: speed against the truth (95 %)"
         yield _speeds([s for s in summary.speeds if s.estimator == estimator], title)
+    for estimator in dict.fromkeys(s.estimator for s in summary.next):
+        title = f"{estimator}: the next surfacing of healthy gliders (95 %)"
+        yield _next([s for s in summary.next if s.estimator == estimator], title)
 
 
 def _table(title: str, left: Iterable[str], right: Iterable[str]) -> Table:
@@ -124,6 +130,21 @@ def _speeds(scores: Iterable[SpeedScore], title: str) -> Table:
             f"{100 * s.rms.value:.1f} ({100 * s.rms.low:.1f}-{100 * s.rms.high:.1f})",
             f"{100 * s.rms_believed.value:.1f}",
             "" if s.coverage is None else f"{100 * s.coverage:.0f}%",
+        )
+    return table
+
+
+def _next(scores: Iterable[NextScore], title: str) -> Table:
+    names = ("n", "off by, km", "same way again", "off by, min", "ellipse", "time")
+    table = _table(title, ("sea",), names)
+    for s in scores:
+        table.add_row(
+            s.sea,
+            str(s.forecasts),
+            *(f"{i.value / 1e3:.2f} ({i.low / 1e3:.2f}-{i.high / 1e3:.2f})" for i in (s.miss, s.persistence)),
+            f"{s.late / 60:.0f}",
+            f"{100 * s.in_ellipse:.0f}%",
+            f"{100 * s.in_time:.0f}%",
         )
     return table
 

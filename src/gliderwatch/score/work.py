@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import time
 from collections.abc import Iterable, Mapping, Sequence
@@ -27,6 +28,7 @@ from gliderwatch.score.estimators import configuration
 from gliderwatch.score.graft import grafted, navigate, own_speeds
 from gliderwatch.score.grid import Cell
 from gliderwatch.score.record import HEALTHY, DiveResult, Record, Told
+from gliderwatch.score.surfacings import results as forecast_results
 from gliderwatch.simulate.delivery import FileForm, Names, arrivals
 from gliderwatch.simulate.dockserver import deliver, from_glider, write_cache
 from gliderwatch.simulate.glider import simulate
@@ -43,7 +45,7 @@ _NOT_SCORED = (
     "cli.py",
     "tables.py",
 )
-_OF_SCORE = ("score/graft.py", "score/record.py", "score/work.py")
+_OF_SCORE = ("score/graft.py", "score/record.py", "score/surfacings.py", "score/work.py")
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +151,9 @@ def _replayed(
     config = configuration(estimator, scenario.glider, low, high)
     request = Request((folder / "gliders",), (folder / "cache",), config)
     store = replay(request, on_file=on_file).store
-    dives = _results(store.assessments(scenario.glider), mission.truth)
+    assessments = store.assessments(scenario.glider)
+    dives = _results(assessments, mission.truth)
+    upcoming = forecast_results(store.forecasts(scenario.glider), assessments, onset or math.inf)
     store.close()
     return Record(
         estimator=estimator,
@@ -168,6 +172,7 @@ def _replayed(
         dives=dives,
         told=tuple(told),
         seconds=round(time.monotonic() - begun, 3),
+        next=upcoming,
     )
 
 
@@ -271,6 +276,11 @@ def _run_real(cell: Cell, mission: Path, estimators: Iterable[str]) -> list[Reco
                 dives=tuple(_result(a, None) for a in store.assessments(segments[0].id.glider)),
                 told=told,
                 seconds=round(time.monotonic() - begun, 3),
+                next=forecast_results(
+                    store.forecasts(segments[0].id.glider),
+                    store.assessments(segments[0].id.glider),
+                    math.inf if cell.fault == HEALTHY else onset,
+                ),
             )
         )
         store.close()
