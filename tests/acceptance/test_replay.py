@@ -50,11 +50,12 @@ def check_assessment(line: dict[str, Any]) -> None:
     assert line["segment"].lower().startswith(line["glider"])
     assert check_time(line["t_dive"]) < check_time(line["t_surface"])
     assert line["flag"] in (0, 1, 2, None)
-    assert (line["flag"] is None) == bool(line["reason"])
+    assert (line["flag"] == 0) == (not line["reason"])
     for name in NUMBERS:
         assert line[name] is None or isinstance(line[name], int | float), name
     assert line["lat"] is None or abs(line["lat"]) <= 90
-    assert line["flag"] is None or None not in (line["lat"], line["speed"], line["p_e"])
+    assert line["flag"] is None or None not in (line["lat"], line["speed"])
+    assert (line["reference_u"] is None) <= (line["p_e"] is None)
     assert line["p_e"] is None or 0 <= line["p_e"] <= 1
     assert 0 <= line["speed_min"] < line["speed_max"]
     assert isinstance(line["n_samples"], int)
