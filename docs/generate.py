@@ -94,6 +94,12 @@ def _is_section(key: str, node: Schema) -> bool:
     return key == "default" and "$ref" in node  # its keys have their own defaults
 
 
+def _ref(value: Schema) -> str | None:
+    """The section that a key holds, also where it may be left out as null."""
+    choices = [value, *value.get("anyOf", ())]
+    return next((choice["$ref"] for choice in choices if "$ref" in choice), None)
+
+
 def configuration() -> str:
     """The page on the configuration, as Markdown."""
     made = schema()
@@ -118,7 +124,7 @@ def _sections(root: Schema, node: Schema, path: str) -> Iterator[tuple[str, Sche
         return
     for key, value in node["properties"].items():
         named = next(iter(value.get("patternProperties", {}).values()), {})
-        ref = value.get("$ref") or named.get("$ref")
+        ref = _ref(value) or named.get("$ref")
         if ref:
             below = ".".join(filter(None, [path, key, "NAME" if named else ""]))
             section = root["$defs"][ref.removeprefix("#/$defs/")]
@@ -128,7 +134,7 @@ def _sections(root: Schema, node: Schema, path: str) -> Iterator[tuple[str, Sche
 
 def _row(path: str, key: str, value: Schema, section: Schema) -> str:
     cells = [f"`{key}`", _kind(value), _default(key, value, section), _prose(value["description"])]
-    if "$ref" in value:
+    if _ref(value):
         anchor = f"{path}.{key}".replace(".", "").lower()
         cells[1:3] = [f"[section](#{anchor})", ""]
     return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import sys
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -160,6 +159,27 @@ def check(config_path: Path) -> None:
 
 
 @main.command()
+@click.option("-c", "--config", "config_path", type=FILE, help="The YAML configuration.")
+@click.option("--send", is_flag=True, help="Send a test message through each channel.")
+@json_option
+def doctor(config_path: Path | None, send: bool, as_json: bool) -> None:
+    """Look at all that gliderwatch needs; ends with 0: all is well, 1: warnings, 2: errors."""
+    import msgspec
+
+    from gliderwatch.run.doctor import DEFAULT, as_lines, examine, exit_code, report, summary
+
+    found = []
+    for finding in examine(config_path or DEFAULT, send=send):
+        found.append(finding)
+        if not as_json:
+            click.echo("\n".join(as_lines(finding)))
+    click.echo(
+        msgspec.json.format(msgspec.json.encode(report(found)), indent=2) if as_json else summary(found)
+    )
+    sys.exit(exit_code(found))
+
+
+@main.command()
 @config_option
 @json_option
 def status(config_path: Path, as_json: bool) -> None:
@@ -184,11 +204,9 @@ def status(config_path: Path, as_json: bool) -> None:
 @click.option("--channel", "only", help="Only this channel.")
 def test_alert(config_path: Path, only: str | None) -> None:
     """Send a test message to every channel, or to one."""
-    from gliderwatch.alerts import message
-    from gliderwatch.alerts.channels import Channel, DeliveryError
     from gliderwatch.config import load
     from gliderwatch.errors import ConfigError
-    from gliderwatch.model import Severity
+    from gliderwatch.run.doctor.service import try_channel
 
     config = load(config_path)
     names = [only] if only is not None else list(config.channels)
@@ -198,16 +216,7 @@ def test_alert(config_path: Path, only: str | None) -> None:
         raise ConfigError(f"{config_path}: no channels are configured")
     failures = 0
     for name in names:
-        now = time.time()
-        text = f"If you can read this, the channel {name} of gliderwatch works."
-        identity = f"test/{name}/{now:.3f}"
-        alert = message.operator(
-            "test of a channel", text, now, alert_id=identity, severity=Severity.INFO, audience=Severity.INFO
-        )
-        try:
-            Channel(name, config.channel_url(name).get_secret_value()).send(alert)
-            click.echo(f"{name}: accepted")
-        except (DeliveryError, ConfigError) as error:
-            failures += 1
-            click.echo(f"{name}: FAILED: {error}")
+        refused = try_channel(config, name)
+        failures += refused is not None
+        click.echo(f"{name}: accepted" if refused is None else f"{name}: FAILED: {refused}")
     sys.exit(1 if failures else 0)

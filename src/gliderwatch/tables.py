@@ -145,4 +145,4 @@ def _next(g: GliderStatus) -> list[tuple[str, str]]:
 def problems(found: Sequence[Problem], console: Console) -> None:
     """What `check` found, the worst first."""
     for problem in sorted(found, key=lambda p: p.severity):
-        console.print(Text(str(problem)), soft_wrap=True)
+        console.print(Text(clean(str(problem), 2000)), soft_wrap=True)

@@ -1,6 +1,7 @@
 """Damaged files never hang, never crash a worker, and never give a value that cannot be."""
 
 import random
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +15,10 @@ from gliderwatch.ingest.decode import Decoder
 from gliderwatch.ingest.header import parse_header, plain
 from gliderwatch.ingest.segment import QUANTITIES
 from gliderwatch.model import Segment
+from gliderwatch.params import GliderParams
+from gliderwatch.pipeline import GliderState, process
 
+CORPUS = Path(__file__).parents[1] / "corpus"
 CRC = "0abc12ef"
 DATA = dinkum.cycles(dinkum.rows(80))
 SENSORS, _ = parse_sensor_list(dinkum.sensor_list(), 0, len(dinkum.SENSORS) + 1)
@@ -133,3 +137,35 @@ def test_intact_cycles_are_a_part_of_the_data(data):
     assert 0 <= end <= len(damaged)
     assert lost in (0, len(damaged) - end)
     assert intact(bytes(damaged[:end]), 0, SENSORS) == (n, end, 0)
+
+
+def test_the_corpus_of_the_fuzzer(tmp_path):
+    """Inputs by which atheris reached further into header, decoder, segment and pipeline.
+
+    What is called `values-` is a whole file of unlikely values; the rest is bytes changed at will.
+    """
+    (tmp_path / f"{CRC}.cac").write_bytes(dinkum.sensor_list())
+    paths = sorted(CORPUS.glob("*.sbd"))
+    assert len(paths) > 300
+    before = tmp_path / "before.sbd"
+    start = dinkum.OPENED_AT - 7200
+    before.write_bytes(dinkum.header("unit_7-2024-250-1-2", start) + dinkum.cycles(dinkum.rows(60, start)))
+    decoded = 0
+    with Decoder([tmp_path], max_workers=2, timeout=20.0) as decoder:
+        [(_, first)] = decoder.map([before])
+        assert isinstance(first, Segment)
+        begun = process(GliderState(), first, GliderParams()).state
+        for path, outcome in decoder.map(paths):
+            if isinstance(outcome, Segment):
+                check(outcome)
+                decoded += 1
+                for state in [GliderState(), begun] if first.id < outcome.id else [GliderState()]:
+                    for a in process(state, outcome, GliderParams()).assessments:
+                        numbers = (a.speed, a.flow_u, a.flow_v, a.p_e, a.clle_max)
+                        assert all(x is None or np.isfinite(x) for x in numbers), (path, a)
+            else:
+                assert isinstance(outcome, Quarantine | Retry), path
+                assert str(outcome).isprintable(), (path, outcome)
+                for sign in ("longer than", "crashed", "outside", "interrupted", "memory"):
+                    assert sign not in str(outcome), (path, outcome)
+    assert decoded > 50

@@ -187,7 +187,7 @@ def test_a_file_in_a_closed_folder_did_not_go(
 ) -> None:
     noted(path, store)
 
-    def closed(self: Path) -> os.stat_result:
+    def closed(self: Path, **_: object) -> os.stat_result:
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(Path, "stat", closed)

@@ -7,7 +7,7 @@ names.
 
 from gliderwatch.config.checking import check
 from gliderwatch.config.loading import load
-from gliderwatch.config.paths import expand, glider_folders
+from gliderwatch.config.paths import expand
 from gliderwatch.config.problem import Problem
 from gliderwatch.config.root import Config
 from gliderwatch.config.sections import Channel, Dockserver, Glider, Recipient, State
@@ -22,6 +22,5 @@ __all__ = [
     "State",
     "check",
     "expand",
-    "glider_folders",
     "load",
 ]

@@ -10,7 +10,6 @@ from pathlib import Path
 from pydantic import ValidationInfo
 
 FROM_GLIDER = "from-glider"
-_NOISE = {"unknown"}  # dockservers keep files of gliders they could not name in it
 
 
 def absolute(path: str, info: ValidationInfo) -> str:
@@ -32,12 +31,3 @@ def expand(patterns: Iterable[str]) -> list[Path]:
 def is_folder(path: Path) -> bool:
     """Whether a folder is there; False, unlike `Path.is_dir`, also where this user may not look."""
     return os.path.isdir(path)  # noqa: PTH112
-
-
-def glider_folders(root: Path) -> list[tuple[str, Path]]:
-    """The from-glider folders below a root (`ROOT/NAME/from-glider`), with the glider's name, lower case.
-
-    Raises `OSError` when the root cannot be listed.
-    """
-    folders = sorted((folder.name.lower(), folder / FROM_GLIDER) for folder in root.iterdir())
-    return [(name, folder) for name, folder in folders if name not in _NOISE and is_folder(folder)]

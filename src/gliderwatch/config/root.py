@@ -15,7 +15,10 @@ from gliderwatch.config.sections import (
     Channel,
     Dockserver,
     Glider,
+    Heartbeat,
+    Metrics,
     Ocean,
+    Operator,
     Preset,
     Recipient,
     Section,
@@ -42,6 +45,9 @@ class Config(Section):
     )
     channels: dict[Name, Channel] = Field(default_factory=dict, description="Ways to send messages.")
     recipients: dict[Name, Recipient] = Field(default_factory=dict, description="Who gets what.")
+    operator: Operator = Field(default=Operator(), description="When the operator is told.")
+    heartbeat: Heartbeat = Field(default=Heartbeat(), description="For a dead man's switch.")
+    metrics: Metrics = Field(default=Metrics(), description="For Prometheus.")
     _document: Document = PrivateAttr(Document(Path("configuration"), None, {}))
     _presets: Mapping[str, Preset] = PrivateAttr(default_factory=dict)
 

@@ -69,7 +69,7 @@ class Staging:
 
     def _stage(self, crc: str, path: Path, source: tuple[Path, int, int]) -> Staged:
         try:
-            content, _ = read_regular(path, _LARGEST)
+            content, _ = read_regular(path, _LARGEST, links=True)
             if not content.startswith(b"s:"):
                 content = decompress(content, _LARGEST)
             content = content.rstrip() + b"\n"

@@ -34,6 +34,7 @@ from gliderwatch.ingest import names
 from gliderwatch.ingest.caches import Staging
 from gliderwatch.ingest.cycles import Sensors, intact, parse_sensor_list
 from gliderwatch.ingest.header import Header, parse_header, plain, read_regular
+from gliderwatch.ingest.scratch import Scratch
 from gliderwatch.ingest.segment import SENSORS, TIME, Samples, build_segment
 from gliderwatch.model import Segment
 
@@ -147,7 +148,7 @@ class Decoder:
     ) -> None:
         self.cache_folders = tuple(cache_folders)
         self._max_workers, self._timeout, self._memory, self._decode = max_workers, timeout, memory, decode
-        self._scratch = tempfile.TemporaryDirectory(prefix="gliderwatch-")
+        self._scratch = Scratch()
         self._lock = Lock()
         self._closed = False
         self._pending: set[Future[Segment]] = set()
@@ -199,9 +200,9 @@ class Decoder:
         """Ends the workers at once, whatever they do."""
         with self._lock:
             self._closed = True
-            self._stop_pool()
-        for future in tuple(self._pending):
+        for future in tuple(self._pending):  # before the workers end: that would be a result of theirs
             future.cancel()
+        self._stop_pool()
         self._scratch.cleanup()
 
     def _new_pool(self) -> ProcessPool:
@@ -286,6 +287,6 @@ def _outcome(path: Path, future: Future[Segment]) -> tuple[Path, Segment | Glide
 
 def _megabytes(path: Path) -> float:
     try:
-        return path.stat().st_size / 1e6
+        return min(path.lstat().st_size, _LARGEST) / 1e6  # what is larger is refused without reading it
     except OSError:
         return 0.0

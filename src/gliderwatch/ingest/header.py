@@ -28,6 +28,12 @@ _MAX_TAGS = 64
 _MAX_SENSORS = 20_000
 _ENCODING = 5
 _FIRST_YEAR, _LAST_YEAR = 1990, 2100
+_NO_FILES = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFLNK: "a symbolic link, which is not followed: put the file itself there",
+    stat.S_IFIFO: "a FIFO",
+    stat.S_IFSOCK: "a socket",
+}
 
 _MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
 _TIME = re.compile(r"[A-Z][a-z]{2}_+([A-Z][a-z]{2})_+(\d{1,2})_+(\d\d):(\d\d):(\d\d)_+(\d{4})", re.ASCII)
@@ -75,23 +81,24 @@ def read_header(path: Path) -> Header:
     return parse_header(plain(data, limit=_BLOCK))
 
 
-def read_regular(path: Path, limit: int, *, whole: bool = True) -> tuple[bytes, os.stat_result]:
+def read_regular(
+    path: Path, limit: int, *, whole: bool = True, links: bool = False
+) -> tuple[bytes, os.stat_result]:
     """The first `limit` bytes of a regular file and its status; it is never waited for (FIFOs, devices).
 
-    With `whole` the file must not be larger than `limit`, nor change while it is read.
+    With `whole` the file must not be larger than `limit`, nor change while it is read. Only with `links`
+    it may be a symbolic link: of a glider's file, one could lead out of the root.
     Raises `Quarantine` if it is no regular file or too large, `Retry` if it cannot be read now.
     """
     try:
-        with open(path, "rb", opener=_open_at_once) as file:
+        _check_regular(path.stat(follow_symlinks=links))  # to open a FIFO would let its writer go on
+        with open(path, "rb", opener=_open_at_once if links else _open_itself) as file:
             before = os.fstat(file.fileno())
-            if not stat.S_ISREG(before.st_mode):
-                raise Quarantine("not a regular file")
+            _check_regular(before)
             if whole and before.st_size > limit:
                 raise Quarantine(f"larger than {limit / 1e6:.0f} MB: no flight data of one segment")
             data = file.read(limit)
             after = os.fstat(file.fileno())
-    except IsADirectoryError as error:
-        raise Quarantine("not a regular file") from error
     except OSError as error:
         raise Retry(f"cannot be read: {error.strerror or error}") from error
     unchanged = (before.st_size, before.st_mtime_ns) == (after.st_size, after.st_mtime_ns)
@@ -100,8 +107,18 @@ def read_regular(path: Path, limit: int, *, whole: bool = True) -> tuple[bytes, 
     return data, after
 
 
+def _check_regular(status: os.stat_result) -> None:
+    if not stat.S_ISREG(status.st_mode):
+        kind = _NO_FILES.get(stat.S_IFMT(status.st_mode), "a device")
+        raise Quarantine(f"not a regular file but {kind}")
+
+
 def _open_at_once(path: str, flags: int) -> int:
     return os.open(path, flags | os.O_NONBLOCK | os.O_NOCTTY)
+
+
+def _open_itself(path: str, flags: int) -> int:
+    return _open_at_once(path, flags | os.O_NOFOLLOW)
 
 
 def plain(data: bytes, limit: int) -> bytes:

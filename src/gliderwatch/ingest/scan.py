@@ -2,7 +2,8 @@
 
 Files count when they lie below a folder `from-glider` of a root, as in
 `ROOT/GLIDER/from-glider` or `ROOT/GROUP/gliders/GLIDER/from-glider`, or below an explicit path of
-a glider. Symbolic links below these are not followed; the paths themselves may be links.
+a glider. Symbolic links below these are not followed; the paths themselves may be links. What has the name
+of flight data and is no regular file (a link, a FIFO, a folder) is found too: to be named, never opened.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A file of flight data; ``glider_folder`` is its folder's name, or the glider of an explicit path."""
+    """What has the name of flight data; ``glider_folder``: its folder, or the glider of an explicit path."""
 
     path: Path
     glider_folder: str
@@ -117,8 +118,7 @@ def _files(entries: Iterable[os.DirEntry[str]], glider_folder: str) -> Iterator[
         if names.kind(entry.name) is None:
             continue
         try:
-            if entry.is_file(follow_symlinks=False):
-                status = entry.stat(follow_symlinks=False)
-                yield Found(Path(entry.path), glider_folder, status.st_size, status.st_mtime_ns)
+            status = entry.stat(follow_symlinks=False)
         except FileNotFoundError:
             continue
+        yield Found(Path(entry.path), glider_folder, status.st_size, status.st_mtime_ns)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,6 +24,7 @@ from watchdog.events import (
 )
 from watchdog.observers.api import BaseObserver, ObservedWatch
 from watchdog.observers.inotify import InotifyObserver
+from watchdog.observers.inotify_c import InotifyConstants, inotify_add_watch, inotify_init
 from watchdog.observers.polling import PollingObserverVFS
 
 from gliderwatch.ingest import names
@@ -31,6 +33,8 @@ from gliderwatch.ingest.scan import IGNORED, Found, Place, expand, find_places, 
 _BESIDE = frozenset({"to-glider", "logs", "configuration"})
 """Folders beside `from-glider` without data: not polled, for a share may be slow."""
 _STOP_SECONDS = 2.0
+_LIMITS = (errno.ENOSPC, errno.EMFILE)
+_CURE = "raise fs.inotify.max_user_watches and max_user_instances with sysctl, or set observer: polling,"
 _INOTIFY: list[type[FileSystemEvent]] = [FileClosedEvent, FileMovedEvent, DirCreatedEvent, DirMovedEvent]
 _POLLING: list[type[FileSystemEvent]] = [FileCreatedEvent, FileModifiedEvent, *_INOTIFY]
 
@@ -72,7 +76,8 @@ class Watcher:
 
     `roots`, the paths of `explicit` (by glider) and `caches` may hold glob patterns, and may not
     exist yet: `refresh`, to be called before every rescan, finds what came and went. The polling
-    observer looks every `poll_seconds`. All methods are for one thread.
+    observer looks every `poll_seconds`. Where the system lets inotify watch no more, polling takes
+    its place until the next start, and `problems` says so. All methods are for one thread.
     """
 
     def __init__(
@@ -87,6 +92,7 @@ class Watcher:
         self._roots, self._explicit, self._cache_patterns = roots, explicit, caches
         self._queue, self._kind, self._poll_seconds = on_change, observer, poll_seconds
         self._observer: BaseObserver | None = None
+        self._instead = ""
         self._watches: dict[Path, tuple[ObservedWatch, tuple[int, int]]] = {}
         self._places: list[Place] = []
         self._caches: list[Path] = []
@@ -96,7 +102,7 @@ class Watcher:
     @property
     def problems(self) -> tuple[str, ...]:
         """What could not be watched, as of the last `refresh`, or read, as of the last `scan`, and why."""
-        return (*self._unwatched, *self._unread)
+        return (*filter(None, [self._instead]), *self._unwatched, *self._unread)
 
     def cache_folders(self) -> tuple[Path, ...]:
         """The cache folders that exist now."""
@@ -109,19 +115,40 @@ class Watcher:
 
     def start(self) -> None:
         """Begins to watch. What cannot be watched is in `problems`; `alive` tells whether it can at all."""
-        observer: BaseObserver
+        self._instead = ""
         try:
-            if self._kind == "inotify":
-                # Full events tell a file that was moved in from one that has only been begun.
-                observer = InotifyObserver(generate_full_events=True)
-            else:
-                observer = PollingObserverVFS(os.lstat, _polled, polling_interval=self._poll_seconds)
-            observer.start()
+            self._begin()
         except OSError as error:
-            self._unwatched = [f"folders cannot be watched: {_why(error)}"]
-            return
+            if self._polls():
+                self._unwatched = [f"folders cannot be watched: {error.strerror or error}"]
+            else:
+                self._poll_instead("folders", error)
+
+    def _begin(self) -> None:
+        observer: BaseObserver
+        if self._polls():
+            observer = PollingObserverVFS(os.lstat, _polled, polling_interval=self._poll_seconds)
+        else:
+            # Full events tell a file that was moved in from one that has only been begun.
+            observer = InotifyObserver(generate_full_events=True)
+        observer.start()
         self._observer = observer
         self.refresh()
+
+    def _polls(self) -> bool:
+        return self._kind == "polling" or bool(self._instead)
+
+    def _poll_instead(self, what: str, error: OSError) -> None:
+        """Look at everything again and again, as inotify watches no more; until the next start."""
+        self.stop()
+        self._instead = (
+            f"inotify cannot watch {what} ({error.strerror or error}): all folders are polled every"
+            f" {self._poll_seconds:g} s; {_CURE} and restart"
+        )
+        try:
+            self._begin()
+        except OSError as worse:
+            self._unwatched = [f"folders cannot be watched: {worse.strerror or worse}"]
 
     def refresh(self) -> None:
         """Watches folders that came or were replaced, and leaves those that went."""
@@ -139,7 +166,12 @@ class Watcher:
             try:
                 self._watch(path, recursive[path], self._observer)
             except OSError as error:
-                self._unwatched.append(f"{path} cannot be watched: {_why(error)}")
+                if error.errno in _LIMITS and not self._polls():
+                    self._poll_instead(str(path), error)
+                    return
+                self._unwatched.append(f"{path} cannot be watched: {error.strerror or error}")
+        if not self._polls() and (full := _full()) is not None:
+            self._poll_instead("every folder", full)
 
     def alive(self) -> bool:
         """Whether every thread that watches lives; that of a folder that is gone need not."""
@@ -167,7 +199,7 @@ class Watcher:
         identity = _identity(path)
         if not is_folder(path):
             raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
-        events = _INOTIFY if self._kind == "inotify" else _POLLING
+        events = _POLLING if self._polls() else _INOTIFY
         watch = observer.schedule(_Handler(self), str(path), recursive=recursive, event_filter=events)
         self._watches[path] = (watch, identity)
         self._queue.put(TreeChanged(path))
@@ -210,6 +242,19 @@ class _Handler(FileSystemEventHandler):
                     self._watcher._changed(Path(os.fsdecode(path)), event.is_directory)
 
 
+def _full() -> OSError | None:
+    """Why no more folders can be watched; None: they can. Watchdog is silent on sub-folders it left out."""
+    instance = inotify_init()
+    if instance < 0:
+        return None  # there may be no further instance, but the one that watches is there
+    try:
+        added = inotify_add_watch(instance, b"/", InotifyConstants.IN_DELETE_SELF)
+        number = ctypes.get_errno()
+    finally:
+        os.close(instance)
+    return OSError(number, "inotify watch limit reached") if added < 0 and number == errno.ENOSPC else None
+
+
 def _identity(path: Path) -> tuple[int, int]:
     status = path.stat()
     return status.st_dev, status.st_ino
@@ -218,12 +263,3 @@ def _identity(path: Path) -> tuple[int, int]:
 def _polled(folder: str | None) -> Iterator[os.DirEntry[str]]:
     with os.scandir(folder) as entries:
         return iter([entry for entry in entries if entry.name.lower() not in IGNORED | _BESIDE])
-
-
-def _why(error: OSError) -> str:
-    if error.errno in (errno.ENOSPC, errno.EMFILE):
-        return (
-            f"{error.strerror}; raise fs.inotify.max_user_watches and max_user_instances with sysctl,"
-            " or set observer: polling"
-        )
-    return error.strerror or str(error)

@@ -18,7 +18,7 @@ DONE = (Status.TAKEN, Status.DUPLICATE, Status.QUARANTINED)
 def state(path: Path) -> tuple[int, int] | None:
     """Size (bytes) and time of change (ns) of a file; None where there is none, zeros where it is closed."""
     try:
-        status = path.stat()
+        status = path.lstat()
     except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError:

@@ -16,11 +16,12 @@ AHEAD = 16
 
 @dataclass(slots=True)
 class Job:
-    """A file to decode; ``result`` is there once it is decoded or has failed."""
+    """A file to decode, ``begun`` (s, monotonic); ``result`` is there once it is decoded or has failed."""
 
     file: File
     header: Header
     result: Segment | Exception | None = None
+    begun: float | None = None
 
 
 @dataclass(slots=True)

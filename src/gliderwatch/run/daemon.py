@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import signal
-import stat
 import threading
 import time
 from collections import deque
@@ -19,17 +18,18 @@ from types import FrameType
 import structlog
 
 from gliderwatch.config import Config, load
-from gliderwatch.errors import ConfigError, GliderwatchError, Quarantine
+from gliderwatch.errors import ConfigError, DamagedError, GliderwatchError, Quarantine, StateError
 from gliderwatch.ingest.watch import CacheChanged, FileChanged
 from gliderwatch.model import Alert, Segment
-from gliderwatch.run import arrivals, heartbeat, intake, logs, notify
+from gliderwatch.run import arrivals, heartbeat, intake, logs, notify, recovery
 from gliderwatch.run.backlog import Job
 from gliderwatch.run.heartbeat import Upkeep
 from gliderwatch.run.intake import Speaking
 from gliderwatch.run.life import BEAT, Life
 from gliderwatch.run.parts import Decoded, News, Parts, build
 from gliderwatch.run.ticking import Ticking
-from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.run.trouble import Trouble
+from gliderwatch.store.sqlite import File, Status
 
 log = structlog.get_logger(__name__)
 
@@ -44,9 +44,11 @@ class Daemon:
         self._config_path, self._workers = config_path, workers
         self._state = Path(config.state.path)
         self._life = Life(self._state)
-        self._store = Store.open(self._state)
+        self._store = recovery.open_state(config)
+        self._trouble = Trouble(self._store, self._is_stopping)
         self._ticking = Ticking(self._store)
-        self._upkeep = Upkeep(config, self._store)
+        with recovery.setting_aside(self._state), self._store.guarded():
+            self._upkeep = Upkeep(config, self._store)
         self._news: SimpleQueue[News] = SimpleQueue()
         self._wake = threading.Event()
         self._stopping = False
@@ -71,10 +73,14 @@ class Daemon:
         log.info("watching", pid=os.getpid(), gliders=gliders, state=str(self._state))
         notify.notify("READY=1", "STATUS=watching")
         try:
-            while not self._stopping:
-                self._turn()
+            with recovery.setting_aside(self._state):
+                while not self._stopping:
+                    if not self._trouble.spared(self._turn):
+                        self._caught_up, self._retry = False, True  # what it had begun may be half done
         except intake.StoppedError:
             pass
+        except DamagedError:  # it is said: the next start makes the state anew
+            raise
         except Exception:
             log.exception("ended by an error")
             raise
@@ -99,11 +105,17 @@ class Daemon:
             self._scan()
         if self._retry:
             self._retry_waiting()
-        self._settled.extend(self._parts.settling.ready(time.monotonic()))
+        fresh = self._parts.settling.ready(time.monotonic())
+        if len(fresh) <= _AT_ONCE:  # a few that just came do not wait for a folder full of old ones
+            self._settled.extendleft(reversed(fresh))
+        else:
+            self._settled.extend(fresh)
         for _ in range(min(_AT_ONCE, len(self._settled))):
-            self._judge(self._settled.popleft())
-        if not self._settled:  # all that came together is in order of time before the first is taken
+            self._judge(self._settled[0])
+            self._settled.popleft()  # only now: when the state cannot be used, it has its turn again
+        if fresh or not self._settled:  # all that came together is in order of time before the first is taken
             self._parts.feed()
+        if not self._settled:
             self._catch_up()
         if self._caught_up and time.monotonic() >= self._next_tick:
             self._tick()
@@ -148,16 +160,17 @@ class Daemon:
         except OSError:  # gone or renamed: its new name is news of its own
             settling.forget(path)
             return
-        if stat.S_ISREG(status.st_mode):
-            settling.observe(path, status.st_size, status.st_mtime_ns, time.monotonic())
+        settling.observe(path, status.st_size, status.st_mtime_ns, time.monotonic())
 
     def _scan(self) -> None:
         """Look at everything: what the observer missed, what waits, folders that are new."""
-        self._next_scan = time.monotonic() + self._parts.config.dockserver.rescan_seconds
+        begun = time.monotonic()
         watcher, settling = self._parts.watcher, self._parts.settling
         watcher.refresh()
         for found in watcher.scan():
             settling.observe(found.path, found.size, found.mtime_ns, time.monotonic())
+        took = time.monotonic() - begun  # where it takes long there is to be time for more than rescans
+        self._next_scan = begun + took + max(took, self._parts.config.dockserver.rescan_seconds)
         self._retry = True
         for problem in watcher.problems:
             log.warning("folder left out", reason=problem)
@@ -193,15 +206,18 @@ class Daemon:
         self._upkeep.decoded(news.job)
         backlog.finish(news.job, news.outcome)
         while (job := backlog.decoded(news.job.header.id.glider)) is not None:
-            self._take(job)
+            try:
+                self._take(job)
+            except StateError:
+                self._again(Path(job.file.path))
+                raise
         self._parts.feed()
 
     def _take(self, job: Job) -> None:
         path, result, glider = Path(job.file.path), job.result, job.header.id.glider
         if arrivals.state(path) not in (None, (job.file.size, job.file.mtime_ns)):
             # it has grown, or is another one: what was decoded may be of before or of after
-            self._parts.settling.forget(path)
-            self._observe(path)
+            self._again(path)
             self._speak(glider)
         elif isinstance(result, Segment) and result.id == job.header.id:
             self._take_in(job.file, result)
@@ -209,6 +225,11 @@ class Daemon:
             self._note(arrivals.failed(job.file, result))
         else:  # it was replaced between header and decoding, and has gone since
             self._speak(glider)
+
+    def _again(self, path: Path) -> None:
+        """Let a file have its turn once more."""
+        self._parts.settling.forget(path)
+        self._observe(path)
 
     def _take_in(self, file: File, segment: Segment) -> None:
         glider = segment.id.glider
@@ -250,9 +271,9 @@ class Daemon:
         """After a start, once all files are in: say what an earlier life left unsaid."""
         if self._caught_up or self._parts.backlog:
             return
-        self._caught_up = True
         for glider in self._store.gliders():
             self._speak(glider)
+        self._caught_up = True
 
     def _tick(self) -> None:
         """Say which gliders are overdue, and look again when the next may be."""

@@ -4,33 +4,63 @@ from __future__ import annotations
 
 import logging
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, MutableMapping
+from typing import Any
 
 import structlog
 
+from gliderwatch.alerts.words import clean
 from gliderwatch.model import Alert
 from gliderwatch.run.intake import Taken
 
 log = structlog.get_logger(__name__)
 
+_LONGEST = 1000
+"""Characters of one value on a terminal."""
+
 
 def configure() -> None:
     """Set up structlog and the log of the libraries, which is heard from warnings on."""
-    logging.basicConfig(level=logging.WARNING, stream=sys.stderr, format="%(name)s: %(message)s")
-    terminal = sys.stderr.isatty()
-    renderer = structlog.dev.ConsoleRenderer() if terminal else structlog.processors.JSONRenderer()
+    heard = logging.StreamHandler(sys.stderr)
+    heard.setFormatter(_OneLine("%(name)s: %(message)s"))
+    logging.basicConfig(level=logging.WARNING, handlers=[heard])
+    renderer: list[structlog.typing.Processor] = (
+        [_printable, structlog.dev.ConsoleRenderer()]
+        if sys.stderr.isatty()
+        else [structlog.processors.JSONRenderer()]
+    )
     structlog.configure(
         processors=[
             structlog.contextvars.merge_contextvars,
             structlog.processors.add_log_level,
             structlog.processors.TimeStamper(fmt="iso", utc=True),
             structlog.processors.format_exc_info,
-            renderer,
+            *renderer,
         ],
         wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
         logger_factory=structlog.WriteLoggerFactory(file=sys.stderr),
         cache_logger_on_first_use=True,
     )
+
+
+class _OneLine(logging.Formatter):
+    """What libraries say, which may hold names of files, in one printable line; tracebacks as they are."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 (logging)
+        return clean(super().formatMessage(record), _LONGEST)
+
+
+def _printable(_logger: object, _method: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
+    """Names from files must not move the cursor, nor begin a line; a traceback keeps its lines."""
+    for key, value in event.items():
+        if isinstance(value, str):
+            lines = value.splitlines() if key == "exception" else [value]
+            event[key] = "\n".join(_indented(line) for line in lines)
+    return event
+
+
+def _indented(line: str) -> str:
+    return line[: len(line) - len(line.lstrip(" "))] + clean(line, _LONGEST)
 
 
 def taken(input_: Taken) -> None:

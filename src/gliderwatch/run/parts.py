@@ -75,6 +75,7 @@ class Parts:
     def feed(self) -> None:
         """Keep the decoder busy, with no more than it can take."""
         while self.backlog.decoding < 2 * self.workers and (job := self.backlog.next()) is not None:
+            job.begun = time.monotonic()
             self.decoder.submit(Path(job.file.path)).add_done_callback(partial(self._decoded, job))
 
     def _decoded(self, job: Job, future: Future[Segment]) -> None:

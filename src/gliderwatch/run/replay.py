@@ -106,9 +106,9 @@ def replay(
 
 
 def find_files(folders: Iterable[Path]) -> list[Path]:
-    """All flight data files below some folders, each once."""
+    """All flight data files below some folders, each once; links are followed, for who replays chose them."""
     found = {
-        path: None
+        path.resolve() if path.is_symlink() else path: None
         for folder in folders
         for path in sorted([folder] if folder.is_file() else folder.rglob("*"))
         if names.kind(path.name) is not None and not path.is_dir()

@@ -16,6 +16,9 @@ from gliderwatch.run.life import STALE, is_held, silence
 from gliderwatch.run.lines import assessment_line, iso
 from gliderwatch.store.sqlite import File, Status, Store, Undelivered
 
+WEEK = 7 * 86400.0
+"""Seconds for which `status` tells what a channel refused for good."""
+
 
 @dataclass(frozen=True, slots=True)
 class GliderStatus:
@@ -94,7 +97,7 @@ def overview(config: Config) -> Overview:
             waiting=tuple(store.files(Status.WAITING)),
             quarantined=tuple(store.files(Status.QUARANTINED)),
             unknown=tuple(store.files(Status.UNKNOWN)),
-            undelivered=tuple(store.undelivered()),
+            undelivered=(*store.undelivered(), *store.refused(time.time() - WEEK)),
         )
     finally:
         store.close()

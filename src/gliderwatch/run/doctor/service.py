@@ -1,0 +1,136 @@
+"""The service: its configuration, state file, channels, and whether it runs."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterable
+from pathlib import Path
+
+from gliderwatch.alerts import message
+from gliderwatch.alerts.channels import Channel, DeliveryError
+from gliderwatch.alerts.words import duration
+from gliderwatch.config import Config, Problem, references
+from gliderwatch.errors import ConfigError, DamagedError, StateError
+from gliderwatch.model import Severity
+from gliderwatch.run import heartbeat
+from gliderwatch.run.doctor.finding import Finding, Findings, Level, error, note, ok, warning
+from gliderwatch.run.life import STALE, is_held, silence
+from gliderwatch.run.operator import failing, reading
+from gliderwatch.store.database import SCHEMA
+
+_START = "systemctl start gliderwatch; journalctl -u gliderwatch tells why it ended"
+_STUCK = "systemctl restart gliderwatch; please report it, with its log"
+
+
+def of_check(topic: str, problems: Iterable[Problem], *keys: str) -> list[Finding]:
+    """What `gliderwatch check` found of keys that begin so."""
+    return [
+        Finding(
+            Level.ERROR if p.severity == "error" else Level.WARNING,
+            topic,
+            f"line {p.where.rpartition(':')[2]}: {p.text}",
+            p.cure,
+        )
+        for p in problems
+        if p.text.startswith(keys)
+    ]
+
+
+def state(config: Config, problems: Iterable[Problem]) -> Findings:
+    """Whether the state file opens, is whole, and of a schema that is known."""
+    yield from of_check("state", problems, "state.")
+    path = Path(config.state.path)
+    if not path.exists():
+        yield note("state", f"{path} is not there yet: the service makes it at its first start")
+        return
+    try:
+        with reading(path) as db:
+            version = db.execute("PRAGMA user_version").fetchone()[0]
+            told = db.execute("PRAGMA quick_check(1)").fetchone()[0]
+    except DamagedError as problem:
+        told, version = str(problem), SCHEMA
+    except StateError as problem:
+        yield error("state", str(problem), "ask as the user of the service; else see docs/state-file.md")
+        return
+    if told != "ok":
+        cure = "stop the service, move the file away, start: all is learnt anew from the files"
+        yield error("state", f"{path} is damaged: {told}", cure)
+    elif version < SCHEMA:
+        yield note("state", f"{path} is whole; schema {version} becomes {SCHEMA} at the next start")
+    else:
+        yield ok("state", f"{path} is whole, schema {version}")
+
+
+def channels(config: Config, problems: Iterable[Problem], send: bool) -> Findings:
+    """Whether channels can be used and do deliver; with `send`, a test message goes through each."""
+    found = of_check("channels", problems, "channels", "recipients")
+    yield from found
+    bad = {f.text.split(".")[1] for f in found if ": channels." in f.text and f.level == Level.ERROR}
+    waiting = failing(Path(config.state.path)) if Path(config.state.path).exists() else {}
+    for name in config.channels:
+        trouble = waiting.get(name)
+        if name in bad:
+            continue
+        refused = try_channel(config, name) if send else None
+        if refused is not None:
+            yield error("channels", f"{name} did not take a test message: {refused}", "compare its URL")
+        elif trouble is not None:
+            late = duration(max(0.0, time.time() - trouble.since))
+            text = f"{name}: {trouble.messages} messages wait, the oldest for {late}: {trouble.error}"
+            yield warning("channels", text, f"gliderwatch test-alert --channel {name}")
+        else:
+            yield ok("channels", f"{name} took a test message" if send else f"{name} can be used")
+
+
+def sign(config: Config) -> Findings:
+    """Whether a sign of life can be given to a dead man's switch."""
+    settings = config.heartbeat
+    template = settings.url.get_secret_value() if settings.url is not None else ""
+    found = []
+    try:
+        heartbeat.url(config)
+    except ConfigError as problem:
+        if references.needs_credentials(template) and references.CREDENTIALS not in os.environ:
+            cure = "credentials are only there inside of the service"
+            found.append(warning("heartbeat", str(problem), cure))
+        else:
+            found.append(error("heartbeat", str(problem), "correct it: the service does not start with it"))
+    if settings.file is not None:
+        file = Path(settings.file)
+        if not os.access(file if file.exists() else file.parent, os.W_OK):
+            found.append(error("heartbeat", f"{file} cannot be written by this user", "name another file"))
+    if not found and (template or settings.file is not None):
+        found = [ok("heartbeat", f"every {settings.minutes:g} min while all is well")]
+    yield from found
+
+
+def try_channel(config: Config, name: str) -> str | None:
+    """Send a test message; why it was not delivered, None when it was."""
+    now = time.time()
+    alert = message.operator(
+        "test of a channel",
+        f"If you can read this, the channel {name} of gliderwatch works.",
+        now,
+        alert_id=f"test/{name}/{now:.3f}",
+        severity=Severity.INFO,
+        audience=Severity.INFO,
+    )
+    try:
+        Channel(name, config.channel_url(name).get_secret_value()).send(alert)
+    except (DeliveryError, ConfigError) as problem:
+        return str(problem)
+    return None
+
+
+def daemon(config: Config) -> Findings:
+    """Whether the service runs and gives signs of life."""
+    path = Path(config.state.path)
+    last, runs = silence(path), is_held(path)
+    if not runs:
+        since = "" if last is None else f" (last sign of life {duration(last)} ago)"
+        yield warning("service", f"does not run{since}", _START)
+    elif last is None or last >= STALE:
+        yield error("service", f"runs, but gives no sign of life for {duration(last or 0.0)}", _STUCK)
+    else:
+        yield ok("service", f"runs, last sign of life {last:.0f} s ago")

@@ -1,0 +1,187 @@
+"""The daemon as installed, when what it watches with, or what it watches, goes away."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from acceptance.angus import FILES, put, taken
+from acceptance.support import Daemon, Site, until
+from gliderwatch.store.sqlite import Status
+
+BROKEN = """
+import errno, os, sys, threading, time
+from pathlib import Path
+from watchdog.observers import inotify_c
+from gliderwatch.run import daemon
+from gliderwatch.ingest import header
+daemon.BEAT = 0.5
+MARK = Path({mark!r})
+{how}
+from gliderwatch.cli import main
+if __name__ == "__main__":
+    main()
+"""
+DIES = """
+threading.excepthook = lambda _: None
+real = inotify_c.InotifyFD.read_events
+def read_events(self, **more):
+    events = real(self, **more)
+    if MARK.exists():
+        MARK.unlink()
+        raise OSError(errno.EIO, "the reader dies")
+    return events
+inotify_c.InotifyFD.read_events = read_events
+"""
+OVERFLOWS = """
+real = inotify_c.InotifyFD.read_events
+def read_events(self, **more):
+    events = real(self, **more)
+    if not MARK.exists():
+        return events
+    return [inotify_c.InotifyEvent(-1, inotify_c.InotifyConstants.IN_Q_OVERFLOW, 0, b"")]
+inotify_c.InotifyFD.read_events = read_events
+"""
+FULL = """
+def full(self, *_, **__):
+    raise OSError(errno.ENOSPC, "inotify watch limit reached")
+inotify_c.InotifyFD.add_callback = full
+"""
+SLOW = """
+real = os.open
+def slow(path, *more, **names):
+    if str(path).endswith(".sbd"):
+        time.sleep(0.3)
+    return real(path, *more, **names)
+os.open = slow
+"""
+
+
+def broken(site: Site, how: str) -> Daemon:
+    """The daemon with something that goes wrong once the file `mark` is there."""
+    mark = str(site.config.with_name("mark"))
+    return Daemon(site, (sys.executable, "-c", BROKEN.format(mark=mark, how=how)))
+
+
+def mark(site: Site) -> Path:
+    """Let it go wrong from now on."""
+    path = site.config.with_name("mark")
+    path.touch()
+    return path
+
+
+def test_a_dead_thread_of_the_watcher_is_started_again(site: Site) -> None:
+    site.configure("angus", rescan_seconds=3600)
+    with broken(site, DIES) as daemon:
+        put(site, FILES[0])
+        taken(site, FILES[0])
+        path = mark(site)
+        put(site, FILES[1])  # the news of it dies with the reader
+        until(lambda: not path.exists(), "the reader has died")
+        until(lambda: daemon.log("observer died, started again"), "noticed")
+        taken(site, FILES[1])
+        put(site, *FILES[2:])
+        taken(site, *FILES[2:])
+        time.sleep(1.5)  # three looks at whether it lives
+        assert len(daemon.log("observer died, started again")) == 1, "only the rescans find files"
+
+
+def test_what_an_overflow_lost_is_found_by_the_rescan(site: Site) -> None:
+    site.configure("angus", rescan_seconds=2)
+    with broken(site, OVERFLOWS) as daemon:
+        put(site, FILES[0])
+        taken(site, FILES[0])
+        path = mark(site)
+        put(site, *FILES[1:4])
+        taken(site, *FILES[1:4])
+        path.unlink()
+        put(site, *FILES[4:])
+        taken(site, *FILES[4:])
+        assert "overflowed" in daemon.text()
+
+
+def test_at_the_limit_of_inotify_it_polls_and_says_so(site: Site) -> None:
+    site.configure("angus", rescan_seconds=3600)
+    with broken(site, FULL) as daemon:
+        until(lambda: daemon.log("folder left out"), "told")
+        assert daemon.log("folder left out")[0]["level"] == "warning"
+        reason = daemon.log("folder left out")[0]["reason"]
+        assert "polled" in reason
+        assert "fs.inotify.max_user_watches" in reason
+        put(site, *FILES)
+        taken(site, *FILES)
+        assert not daemon.log("observer died.*")
+
+
+@pytest.mark.parametrize("observer", ["inotify", "polling"])
+def test_a_root_that_is_unmounted_and_back(site: Site, observer: str) -> None:
+    site.configure("angus", rescan_seconds=1, observer=observer)
+    away = site.root.with_name("away")
+    with Daemon(site) as daemon:
+        put(site, FILES[0])
+        taken(site, FILES[0])
+        site.root.rename(away)
+        until(lambda: any(str(site.root) in e["reason"] for e in daemon.log("folder left out")), "told")
+        for file in FILES[1:3]:
+            (away / "angus" / "from-glider" / file.name).write_bytes(file.data)
+        site.root.mkdir()  # the bare mount point
+        time.sleep(1.1)  # one rescan sees it
+        site.root.rmdir()
+        away.rename(site.root)
+        taken(site, *FILES[:3])
+        put(site, *FILES[3:])
+        taken(site, *FILES[3:])
+        assert daemon.alive()
+        assert site.statuses(*(f.name for f in FILES)) == [Status.TAKEN] * len(FILES)
+        assert len(daemon.log("file taken")) == len(FILES), "taken twice"
+
+
+def test_new_cache_folders_of_a_pattern_are_noticed(site: Site, tmp_path: Path) -> None:
+    site.configure("angus", cache=[f"{tmp_path}/stations/*/cache"], rescan_seconds=1)
+    with Daemon(site):
+        put(site, *FILES)
+        names = [file.name for file in FILES]
+        until(lambda: site.statuses(*names) == [Status.WAITING] * len(names), "wait for their caches")
+        (tmp_path / "stations" / "north" / "cache").mkdir(parents=True)
+        south = tmp_path / "stations" / "south"
+        shutil.copytree(site.cache, south / "cache.part")
+        (south / "cache.part").rename(south / "cache")
+        taken(site, *FILES)
+
+
+def test_a_slow_share_delays_but_loses_nothing_and_the_signs_of_life_go_on(site: Site) -> None:
+    alive = site.state.with_name(site.state.name + ".alive")
+    longest = 0.0
+    with broken(site, SLOW):
+        put(site, *FILES)
+
+        def all_taken() -> bool:
+            nonlocal longest
+            longest = max(longest, time.time() - alive.stat().st_mtime)
+            return site.statuses(*(f.name for f in FILES)) == [Status.TAKEN] * len(FILES)
+
+        until(all_taken, "taken")
+    assert longest < 10.0
+
+
+def test_a_writer_that_is_slow_is_waited_for(site: Site, daemon: Daemon) -> None:
+    """A short name that grows with pauses shorter than the time to settle, and the glider's clock."""
+    data, path = FILES[0].data, site.folder("angus") / "01330000.sbd"
+    part = len(data) // 5 + 1
+    with path.open("wb") as file:
+        for start in range(0, len(data), part):
+            file.write(data[start : start + part])
+            file.flush()
+            os.utime(path, (86400.0 * start, 86400.0 * start))
+            time.sleep(0.3)
+
+    def whole() -> bool:
+        file = site.files().get(path.name)
+        return file is not None and (file.status, file.size) == (Status.TAKEN, len(data))
+
+    until(whole, "taken as a whole")
