@@ -63,9 +63,8 @@ def test_no_such_grid():
 
 def test_an_unknown_estimator_is_refused_with_the_known_ones():
     assert check("adaptive:franklin") in known()
-    with pytest.raises(
-        GliderwatchError, match=r"no estimator adaptve; known are: joint, composite, adaptive, adaptive:franklin"
-    ):
+    names = "joint, composite, adaptive, adaptive:franklin"
+    with pytest.raises(GliderwatchError, match=f"no estimator adaptve; known are: {names}"):
         check("adaptve")
 
 
