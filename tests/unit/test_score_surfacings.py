@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from alert_support import HEALTHY
 from gliderwatch.model import Assessment, Expected
 from gliderwatch.navigation.frame import from_plane
 from gliderwatch.score.surfacings import next_scores, results
@@ -18,32 +19,8 @@ def dive(k: int, east: float, **evidence: float) -> Assessment:
     """The ``k``-th dive of 3 h, with a fix two minutes after it, ``east`` metres from the start."""
     lat, lon = from_plane(np.array([east, 0.0]), LAT, LON)
     t = k * 3 * HOUR
-    return Assessment(
-        glider="unit",
-        segment=f"s{k}",
-        t_dive=t,
-        t_surface=t + 2.8 * HOUR,
-        lat=lat,
-        lon=lon,
-        flag=0,
-        reason="",
-        speed=0.25,
-        speed_min=0.2,
-        speed_max=0.3,
-        flow_u=0.0,
-        flow_v=0.0,
-        reference_u=0.0,
-        reference_v=0.0,
-        reference_final=True,
-        p_e=0.0,
-        gamma_f=0.3,
-        clle_max=None,
-        excitation=None,
-        n_samples=10,
-        evidence={"fix_gap_minutes": 2.0, **evidence},
-        notes=(),
-        parameters="",
-    )
+    evidence = {"fix_gap_minutes": 2.0} | evidence
+    return replace(HEALTHY, t_dive=t, t_surface=t + 2.8 * HOUR, lat=lat, lon=lon, evidence=evidence)
 
 
 def fix(k: int) -> float:

@@ -113,8 +113,8 @@ class Daemon:
         for _ in range(min(_AT_ONCE, len(self._settled))):
             self._judge(self._settled[0])
             self._settled.popleft()  # only now: when the state cannot be used, it has its turn again
-        if fresh or not self._settled:  # all that came together is in order of time before the first is taken
-            self._parts.feed()
+        if not self._settled or 0 < len(fresh) <= _AT_ONCE:
+            self._parts.feed()  # all that came together is in order of time before the first is taken
         if not self._settled:
             self._catch_up()
         if self._caught_up and time.monotonic() >= self._next_tick:
