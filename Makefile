@@ -7,6 +7,7 @@ WHEELS ?= --only-binary :all:
 # pytest processes; tests marked `timing` always run alone.
 JOBS ?= 2
 UV_VERSION := 0.13.9
+CYCLONEDX_VERSION := 7.5.0
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -14,7 +15,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 WHEELHOUSE := dist/wheelhouse
 
 .DEFAULT_GOAL := help
-.PHONY: help install test demo lint format types contracts docs wheelhouse lock clean
+.PHONY: help install test demo lint format types contracts audit sbom docs wheelhouse lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -58,11 +59,22 @@ contracts: $(VENV)/installed ## who may import what (.importlinter)
 docs: $(VENV)/installed ## make what in docs/ comes from the code
 	$(BIN)/python docs/generate.py
 
-wheelhouse: $(VENV)/installed ## everything a machine without internet needs, in one archive
+audit: $(VENV)/installed ## is what is locked installed just so, and is a weakness known of it?
+	$(BIN)/python .ci/audit.py requirements.lock
+
+sbom: ## what the service is made of, as CycloneDX: dist/gliderwatch.cdx.json
+	$(PYTHON) -m venv build/sbom
+	build/sbom/bin/python -m pip install --quiet cyclonedx-bom==$(CYCLONEDX_VERSION)
+	@mkdir -p dist
+	build/sbom/bin/cyclonedx-py requirements --pyproject pyproject.toml --of JSON -o dist/gliderwatch.cdx.json requirements.lock
+	@echo "dist/gliderwatch.cdx.json"
+
+wheelhouse: $(VENV)/installed sbom ## everything a machine without internet needs, in one archive
 	rm -rf $(WHEELHOUSE)
 	$(PIP) download --quiet --require-hashes $(WHEELS) -r requirements.lock -d $(WHEELHOUSE)
 	$(PIP) wheel --quiet --no-deps --no-build-isolation --no-index -w $(WHEELHOUSE) .
 	cp -r requirements.lock config systemd docs/install.md docs/configuration.md $(WHEELHOUSE)
+	cp dist/gliderwatch.cdx.json $(WHEELHOUSE)
 	tar -C dist -czf dist/gliderwatch-wheelhouse.tar.gz wheelhouse
 	@echo "dist/gliderwatch-wheelhouse.tar.gz: for $$($(BIN)/python -V) on $$(uname -m); see docs/install.md"
 
