@@ -172,3 +172,17 @@ def test_a_file_that_comes_does_not_wait_for_a_folder_full_of_bad_ones(loop: Loo
     loop.until(loop.is_taken)
     loop.until(lambda: not loop.daemon._settled)
     assert len(loop.daemon._store.files(Status.QUARANTINED)) == 1000
+
+
+def test_a_file_that_grew_without_news_before_it_was_looked_at_settles_anew(loop: Loop) -> None:
+    """A busy machine may bring the news of a growing file late: still for a second is still on disk."""
+    path = loop.inbox / "02500003.sbd"
+    path.write_bytes(PART)
+    loop.daemon._news.put(FileChanged(path, "unit_7"))
+    loop.until(lambda: loop.daemon._parts.settling.next_deadline(time.monotonic()) is not None)
+    settled = time.monotonic() + 1.1
+    path.write_bytes(WHOLE)
+    loop.until(lambda: time.monotonic() > settled)
+    assert not loop.hand.held, "taken as it was a second ago"
+    loop.until(lambda: loop.hand.held)
+    assert time.monotonic() > settled + 0.8

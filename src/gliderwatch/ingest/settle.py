@@ -46,6 +46,10 @@ class Settling:
             self._passed[path] = (entry.size, entry.mtime_ns)
         return due
 
+    def passed(self, path: Path) -> tuple[int, int] | None:
+        """Size and mtime (ns) with which a file passed last."""
+        return self._passed.get(path)
+
     def forget(self, path: Path) -> None:
         """Knows nothing of a file any more: it is gone, or is to be let pass once more."""
         self._waiting.pop(path, None)

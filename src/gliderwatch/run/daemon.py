@@ -105,7 +105,7 @@ class Daemon:
             self._scan()
         if self._retry:
             self._retry_waiting()
-        fresh = self._parts.settling.ready(time.monotonic())
+        fresh = [path for path in self._parts.settling.ready(time.monotonic()) if self._is_still(path)]
         if len(fresh) <= _AT_ONCE:  # a few that just came do not wait for a folder full of old ones
             self._settled.extendleft(reversed(fresh))
         else:
@@ -161,6 +161,15 @@ class Daemon:
             settling.forget(path)
             return
         settling.observe(path, status.st_size, status.st_mtime_ns, time.monotonic())
+
+    def _is_still(self, path: Path) -> bool:
+        """Whether a file is as it was when it settled; one that has grown since settles anew."""
+        settling = self._parts.settling
+        if arrivals.state(path) in (None, settling.passed(path)):
+            return True
+        settling.forget(path)
+        self._observe(path)
+        return False
 
     def _scan(self) -> None:
         """Look at everything: what the observer missed, what waits, folders that are new."""
@@ -237,7 +246,10 @@ class Daemon:
         begun = time.monotonic()
         try:
             now, ocean = time.time(), self._parts.ocean.field(glider)
-            taken = intake.take(self._store, file, segment, params, speaking, now, self._is_stopping, ocean)
+            with self._store.followed_by(self._parts.backlog.behind(glider)):
+                taken = intake.take(
+                    self._store, file, segment, params, speaking, now, self._is_stopping, ocean
+                )
         except Quarantine as error:
             log.error("file cannot be assessed", path=file.path, exc_info=error.__cause__)
             self._note(arrivals.failed(file, error))
