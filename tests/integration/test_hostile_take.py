@@ -181,6 +181,7 @@ def test_a_file_that_grew_without_news_before_it_was_looked_at_settles_anew(loop
     loop.daemon._news.put(FileChanged(path, "unit_7"))
     settling = loop.daemon._parts.settling
     loop.until(lambda: settling.next_deadline(time.monotonic()) is not None)
+    loop.daemon._parts.watcher.stop()  # from here on no news comes
     loop.until(lambda: (settling.next_deadline(time.monotonic()) or 0.0) < 0.3)
     grown = time.monotonic()
     path.write_bytes(WHOLE)
