@@ -70,7 +70,8 @@ def navigated(segments: Sequence[Segment]) -> list[Dive]:
     for segment in segments:
         state, told = extend(state, segment)
         dives |= {dive.t_dive: dive for dive in told}
-    return [dives[t] for t in sorted(dives) if dives[t].end is not None]
+    ended = [dives[t] for t in sorted(dives) if dives[t].end is not None]
+    return [replace(dive, evidence=dict(dive.evidence)) for dive in ended]  # so that another process takes it
 
 
 def read(folder: Path, cache: Path) -> list[Segment]:
