@@ -93,9 +93,9 @@ def _apart(found: Estimate, other: Reference) -> bool:
 def _notes(dive: Dive, current: Current | None, other: Reference | None) -> tuple[str, ...]:
     if other is not None:
         return (*dive.notes, *other.notes)
-    if current is not None and not current.final:
-        return (*dive.notes, "depth-averaged current is provisional")
-    return dive.notes
+    if current is None:
+        return (*dive.notes, "no depth-averaged current: a wrong flow cannot be told")
+    return dive.notes if current.final else (*dive.notes, "depth-averaged current is provisional")
 
 
 def _numbers(verdict: Verdict, info: JointInfo) -> dict[str, float]:

@@ -226,7 +226,7 @@ def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: S
     own = info.seen.own_speed()
     if own is not None and own[1] < OWN_SURE * own[0]:
         state = replace(state, ratios=learn_ratios(state.ratios, dive.evidence, own[0]))
-    if params.learning is None or info.told is not None or info.seen.current is None:
+    if params.learning is None or info.told is not None:
         return state
     hours = dive.evidence.get("duration_h", 0.0)
     return replace(state, normal=learn(state.normal, info.estimate.speed, at, hours, params.learning))
