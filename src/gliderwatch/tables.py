@@ -47,7 +47,7 @@ def dives(assessments: Sequence[Assessment]) -> Table:
     table.add_column("flag", max_width=14)
     for column in table.columns:
         column.no_wrap = True
-    for name in ("speed", "own", "flow E N", "DAC E N", "p_E", "CLLE"):
+    for name in ("speed", "±", "own", "flow E N", "DAC E N", "p_E"):
         table.add_column(name, justify="right", no_wrap=True)
     for a in assessments:
         table.add_row(
@@ -55,11 +55,11 @@ def dives(assessments: Sequence[Assessment]) -> Table:
             _number(a.evidence.get("duration_h"), ".1f"),
             flag(a),
             _number(a.speed),
+            _number(a.evidence.get("speed_sigma")),
             _number(a.evidence.get("along_speed")),
             _vector(a.flow_u, a.flow_v),
             _vector(a.reference_u, a.reference_v),
             _number(a.p_e),
-            _number(a.clle_max, ".0f"),
         )
     return table
 
