@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -111,6 +111,7 @@ class MemoryStore:
         self.next_try: dict[int, float] = {}
         self.done: dict[int, float] = {}
         self.errors: list[tuple[int, str, float]] = []
+        self.given_up: dict[int, str] = {}
         self.marked: list[int] = []
         self.threads: set[int] = set()
         self.broken = 0
@@ -162,6 +163,30 @@ class MemoryStore:
             self.rows[row_id] = OutboxRow(row.id, row.alert, row.channel, row.attempts + 1)
             self.next_try[row_id] = next_try
             self.errors.append((row_id, error, next_try))
+
+    def refused(
+        self, row_id: int, error: str, now: float, report: Alert | None, channels: Iterable[str]
+    ) -> None:
+        with self.lock:
+            self._use()
+            self.done[row_id] = now
+            self.given_up[row_id] = error
+            known = {(row.alert.id, row.channel) for row in self.rows.values()}
+        for channel in channels if report is not None else ():
+            if report is not None and (report.id, channel) not in known:
+                self.add(report, channel)
+
+    def park(self, row_id: int, error: str) -> None:
+        with self.lock:
+            self._use()
+            self.next_try[row_id] = float("inf")
+            self.errors.append((row_id, error, float("inf")))
+
+    def adopt(self, channels: Iterable[str]) -> None:
+        with self.lock:
+            for row in self.rows.values():
+                if row.channel in set(channels) and self.next_try[row.id] == float("inf"):
+                    self.next_try[row.id] = 0.0
 
     def close(self) -> None:
         pass

@@ -32,3 +32,11 @@ class Quarantine(GliderwatchError):
 
 class ConfigError(GliderwatchError):
     """The configuration is wrong; the text names the file, the line and the cure."""
+
+
+class StateError(GliderwatchError):
+    """The state file cannot be used now; the text says which, why, and what to do."""
+
+
+class DamagedError(StateError):
+    """What the state file holds is not what was written: it has to be set aside and made anew."""

@@ -10,8 +10,10 @@ from rich.text import Text
 
 from gliderwatch.alerts.words import clean, duration, utc
 from gliderwatch.config import Problem
-from gliderwatch.model import Assessment, Flag, Severity
+from gliderwatch.model import Assessment, Flag, Incident, Severity
+from gliderwatch.rules.acknowledged import Ack
 from gliderwatch.run.lines import iso
+from gliderwatch.run.manage.incidents import Noted
 from gliderwatch.run.status import GliderStatus, Overview
 from gliderwatch.store.sqlite import File, Status
 
@@ -91,8 +93,10 @@ def status(view: Overview, console: Console) -> None:
             console.print(Text(text, style=style))
     for glider in view.gliders:
         for i in glider.incidents:
+            ack = glider.acks.get(i.id)
             text = f"{clean(i.glider)}: {i.kind} open since {utc(i.since)}, {i.dives} dives"
-            console.print(Text(text, style=_STYLES[i.severity]))
+            taken_on = "" if ack is None else f", {acknowledged(ack, i)}"
+            console.print(Text(text + taken_on, style=_STYLES[i.severity]))
     files(view.files, [*view.waiting, *view.quarantined], console)
     if view.unknown:
         names = ", ".join(clean(g) for g in sorted({f.glider for f in view.unknown}))
@@ -140,6 +144,34 @@ def _next(g: GliderStatus) -> list[tuple[str, str]]:
     late = f", {duration(g.at - call.t)} late" if g.at > call.t else ""
     where = "" if g.place is None else f" near {g.place[0]:.3f} {g.place[1]:.3f}"
     return [*told, ("yellow" if late else "", f"{name}: next surfacing {utc(call.t)}{where}{late}")]
+
+
+def acknowledged(ack: Ack, incident: Incident) -> str:
+    """Who took an incident on, in words."""
+    worse = "" if ack.holds(incident) else ", WORSE SINCE"
+    note = f": {clean(ack.note)}" if ack.note else ""
+    return f"acknowledged by {clean(ack.by, 40)}{worse}{note}"
+
+
+def incidents(found: Sequence[Noted], console: Console) -> None:
+    """Incidents, a few lines each: the id, since when, how bad, and who has taken it on; 80 columns."""
+    for noted in found:
+        i, ack = noted.incident, noted.ack
+        over = "open" if i.cleared_at is None else f"cleared {utc(i.cleared_at)}"
+        style = "dim" if i.cleared_at is not None else _STYLES[i.severity]
+        console.print(Text(clean(i.id), style=style), soft_wrap=True)
+        console.print(Text(f"  {i.kind}, {i.severity.name.lower()}, {over}"))
+        console.print(Text(f"  since {utc(i.since)}, {i.dives} dives"))
+        console.print(Text(f"  worst {_dive(i.worst)}"))
+        console.print(Text(f"  last  {_dive(i.last)}"))
+        if ack is not None:
+            console.print(Text(f"  {acknowledged(ack, i)}, {utc(ack.at)}"))
+
+
+def _dive(a: Assessment) -> str:
+    speed = "speed unknown" if a.speed is None else f"{a.speed:.2f} m/s"
+    error = "" if a.p_e is None else f", p_E {a.p_e:.2f}"
+    return f"{utc(a.t_surface)}: {speed} (normal {a.speed_min:.2f}-{a.speed_max:.2f}){error}"
 
 
 def problems(found: Sequence[Problem], console: Console) -> None:

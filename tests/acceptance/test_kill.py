@@ -6,13 +6,13 @@ import random
 import shutil
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from acceptance.chaos import Chaos, Sent, differences, fleet
 from acceptance.support import (
     TRACEBACK,
     Daemon,
@@ -29,15 +29,6 @@ from gliderwatch.simulate.dockserver import FileForm, Names, arrivals
 from gliderwatch.store.sqlite import Status
 
 KILLS = 5
-
-
-@dataclass(frozen=True, slots=True)
-class Sent:
-    """A file as it comes: name and content."""
-
-    glider: str
-    name: str
-    data: bytes
 
 
 def simulated() -> list[Sent]:
@@ -143,6 +134,25 @@ def test_a_real_mission_in_any_order_with_kills_ends_as_a_replay_does(
     statuses = [file.status for file in site.files().values()]
     assert statuses.count(Status.WAITING) in (1, 2)  # no cache; once or twice, as its names come
     assert results(site.state)["electa"][1], "no incident: a test of little"
+
+
+def test_kills_at_commit_points_and_at_random_lose_nothing(tmp_path: Path) -> None:
+    """`benchmarks/chaos_kill.py` does the same with hundreds of kills."""
+    site, missions = Site(tmp_path), fleet(3.0)
+    gliders = [mission.scenario.glider for mission in missions]
+    site.caches(*missions)
+    with mail_server() as box:
+        site.configure(*gliders, url=box.url, surfacing=gliders)
+        chaos = Chaos(site, missions, seed=5)
+        with chaos.daemon:
+            chaos.daemon.kill()
+            chaos.kill(12)
+            chaos.finish()
+        assert differences(chaos, box) == []
+    assert TRACEBACK not in chaos.daemon.text()
+    assert chaos.tally.kills.total() == 12 and sum("commit" in where for where in chaos.tally.kills) > 2
+    assert chaos.tally.dives > 40 and chaos.tally.copies > 8
+    assert list(chaos.daemon.scratch.iterdir()) == []
 
 
 class Cutting(Mailbox):

@@ -46,13 +46,14 @@ class Inbox:
         self.mails: list[EmailMessage] = []
         self.recipients: list[list[str]] = []
         self.refuse: set[str] = set()
+        self.refusal = "550 no such user"
         self.answer = "250 taken"
 
     async def handle_RCPT(  # noqa: N802
         self, server: SMTP, session: Session, envelope: Envelope, address: str, options: list[str]
     ) -> str:
         if address in self.refuse:
-            return f"550 no such user {address}"
+            return f"{self.refusal} {address}"
         envelope.rcpt_tos.append(address)
         return "250 fine"
 
@@ -205,9 +206,10 @@ class TestMail:
 
     def test_whoever_accepted_is_not_sent_it_again(self, post: Post) -> None:
         channel = Channel("mail", post.url("a@example.org,b@example.org"))
-        post.inbox.refuse = {"b@example.org"}
-        with pytest.raises(DeliveryError, match="refused 1 of 2 recipients: 550"):
+        post.inbox.refuse, post.inbox.refusal = {"b@example.org"}, "451 greylisted, come back later"
+        with pytest.raises(DeliveryError, match="refused 1 of 2 recipients for now: 451") as failure:
             channel.send(alert())
+        assert not failure.value.permanent
         post.inbox.refuse = set()
         channel.send(alert())
         assert post.inbox.recipients == [["a@example.org"], ["b@example.org"]]

@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 
 import pytest
 from hypothesis import given
@@ -203,13 +204,78 @@ def test_a_channel_that_raises_anything_is_tried_again_and_its_text_is_not_kept(
     assert store.errors[0][1] == "unexpected RuntimeError"
 
 
-def test_a_row_for_a_channel_that_is_gone_is_kept_and_says_so() -> None:
-    store = MemoryStore()
+def test_a_row_for_a_channel_that_is_gone_is_parked_until_it_is_there_again() -> None:
+    store, channel = MemoryStore(), FakeChannel()
     row = store.add(alert(), "old")
-    with running(store, {"mail": FakeChannel()}):
+    with running(store, {"mail": channel}) as (_, wake):
         until(lambda: bool(store.errors))
-    assert "no such channel" in store.errors[0][1]
+        store.add(alert("a2"), "mail")  # gives the dispatcher another round
+        wake.set()
+        until(lambda: channel.sent == ["a2"])
+    assert ["no such channel" in error for _, error, _ in store.errors] == [True]
     assert row not in store.done
+    with running(store, {"old": channel}):
+        until(lambda: row in store.done)
+    assert channel.sent == ["a2", "a1"]
+
+
+class TestRefused:
+    """A channel that will never take a message."""
+
+    def refusing(self) -> FakeChannel:
+        return FakeChannel(fail=1, error=DeliveryError("550 no such user", permanent=True))
+
+    def test_it_is_not_tried_again_and_holds_back_nothing(self) -> None:
+        store, channel = MemoryStore(), self.refusing()
+        first, second = store.add(alert("a1"), "mail"), store.add(alert("a2"), "mail")
+        with running(store, {"mail": channel}):
+            until(lambda: second in store.done)
+        assert store.given_up == {first: "550 no such user"}
+        assert channel.sent == ["a2"] and channel.tries == 2 and store.errors == []
+
+    def test_the_others_hear_of_it_once_a_day(self) -> None:
+        store, channel, other = MemoryStore(), self.refusing(), FakeChannel()
+        channel.fail = 2
+        for n in range(2):
+            store.add(alert(f"a{n}", incident=str(n)), "mail")
+        with running(store, {"mail": channel, "slack": other}):
+            until(lambda: len(store.given_up) == 2 and len(other.sent) == 1)
+        (report,) = (row.alert for row in store.rows.values() if row.channel == "slack")
+        assert "mail refuses" in report.title and "550 no such user" in report.body
+        assert [row.alert.id for row in store.rows.values() if row.channel == "mail"] == ["a0", "a1"]
+
+    def test_no_report_is_made_of_a_report(self) -> None:
+        store, a, b = MemoryStore(), self.refusing(), self.refusing()
+        a.fail = b.fail = 100
+        store.add(alert(), "a")
+        with running(store, {"a": a, "b": b}):
+            until(lambda: len(store.given_up) == 2)
+        assert len(store.rows) == 2
+
+
+def test_a_dispatcher_that_cannot_read_the_outbox_makes_no_progress() -> None:
+    store = MemoryStore()
+    with running(store, {"mail": FakeChannel()}) as (dispatcher, wake):
+        until(lambda: store.opened == 1)
+        until(dispatcher.alive)
+        store.broken = 10**6
+        wake.set()
+        until(lambda: store.opened >= 2, 10)
+        before = dispatcher.progress()
+        until(lambda: store.opened >= 3, 10)
+        assert dispatcher.progress() == before
+        store.broken = 0
+        until(lambda: dispatcher.progress() > before, 10)
+
+
+def test_a_dead_server_is_asked_some_dozen_times_in_six_hours_and_then_at_least_every_17_minutes() -> None:
+    """The schedule of a channel that is down for hours, with time as an argument."""
+    now, tries = 0.0, []
+    while now < 6 * 3600:
+        tries.append(now)
+        now += retry_delay(len(tries), 7)
+    assert 28 <= len(tries) <= 33
+    assert tries[3] < 60 and all(later - earlier <= 990 for earlier, later in pairwise(tries))
 
 
 def test_tells_the_watchdog_that_it_moves() -> None:

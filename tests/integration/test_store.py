@@ -3,21 +3,23 @@
 import sqlite3
 import subprocess
 import sys
+import zlib
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from alert_support import SLOW, alert, incident
-from gliderwatch.errors import GliderwatchError
+from gliderwatch.errors import DamagedError, GliderwatchError, StateError
 from gliderwatch.model import Alert, Expected, Segment, SegmentId, Series, readonly
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Memory, Outcome
 from gliderwatch.rules.announce import Said
 from gliderwatch.rules.silence import Sign
 from gliderwatch.run import intake
-from gliderwatch.store import codec, database
-from gliderwatch.store.database import SCHEMA, StateError
+from gliderwatch.store import codec, damage, database
+from gliderwatch.store.database import SCHEMA
 from gliderwatch.store.outbox import Outbox
 from gliderwatch.store.sqlite import File, Status, Store
 from missions import Leg, cut, ending, feed, mission
@@ -125,6 +127,129 @@ class TestOpening:
         (tmp_path / "file").write_text("")
         with pytest.raises(StateError, match=r"Choose another state\.path"):
             Store.open(tmp_path / "file" / "state.sqlite")
+
+
+class TestTrouble:
+    """The state file cannot be written, or read."""
+
+    def limited(self, store: Store) -> None:
+        """No page more than the file has now: what a full disk is to SQLite."""
+        pages = store._db.execute("PRAGMA page_count").fetchone()[0]
+        store._db.execute(f"PRAGMA max_page_count = {pages}")
+
+    def test_a_full_disk_is_said_and_nothing_is_half_written(self, store):
+        self.limited(store)
+        with (
+            pytest.raises(StateError, match=r"cannot be used: .*full. What to do: make room"),
+            store.transaction(),
+        ):
+            for n in range(1000):
+                store.note(file(f"file {n}"), 0.0)
+        assert store.counts() == {} and not store._db.in_transaction
+        store._db.execute("PRAGMA max_page_count = 100000")
+        with store.transaction():
+            store.note(file("a"), 0.0)
+        assert store.counts() == {Status.TAKEN: 1}
+
+    def test_what_cannot_be_committed_is_taken_back(self, store, monkeypatch):
+        class Failing(sqlite3.Connection):
+            def execute(self, sql, *values):
+                if sql == "COMMIT" and self.fails:
+                    raise sqlite3.OperationalError("disk I/O error")
+                return super().execute(sql, *values)
+
+        path = store._path
+        db = sqlite3.connect(path, isolation_level=None, factory=Failing)
+        db.fails = True
+        other = Store(db, path)
+        with pytest.raises(StateError, match="disk I/O error"), other.transaction():
+            other.note(file("a"), 0.0)
+        db.fails = False
+        assert other.counts() == {}
+        with other.transaction():
+            other.note(file("b"), 0.0)
+        assert other.counts() == {Status.TAKEN: 1}
+
+    def test_a_lock_is_said(self, store, path):
+        store._db.execute("PRAGMA busy_timeout = 20")
+        with closing(sqlite3.connect(path, isolation_level=None)) as other:
+            other.execute("BEGIN IMMEDIATE")
+            with pytest.raises(StateError, match="end the program that holds it locked"):
+                store.probe()
+        store.probe()
+
+    def test_a_probe_needs_to_write(self, store):
+        store.probe()
+        store._db.execute("PRAGMA query_only = 1")
+        with pytest.raises(StateError, match="let the user of the service write there"):
+            store.probe()
+
+    def test_a_mistake_of_the_program_is_no_trouble_of_the_disk(self, store):
+        with pytest.raises(sqlite3.IntegrityError), store.transaction():
+            store._db.execute("INSERT INTO outbox (alert, channel, incident) VALUES ('zz', 'mail', '')")
+
+    @pytest.mark.parametrize(
+        "record", [b"", b"\x00", zlib.compress(b"{}"), zlib.compress(b'{"v": 1, "data": 3}')]
+    )
+    def test_a_record_that_makes_no_sense_is_damage(self, record):
+        with pytest.raises(DamagedError):
+            codec.decode(record, GliderState)
+
+
+class TestDamage:
+    def test_a_whole_file_and_no_file_are_not_damaged(self, store, path):
+        with store.transaction():
+            store.note(file("a"), 0.0)
+        assert damage.damage(path) is None and damage.damage(path.with_name("none")) is None
+
+    def test_another_kind_of_file_an_empty_one_and_bad_pages(self, store, path):
+        for n in range(500):
+            store.note(file(f"file {n}"), 0.0)
+        store.close()
+        whole = path.read_bytes()
+        for bad in (b"", b"x" * 5000, whole[:5000], whole[:8192] + b"\xa5" * 8192 + whole[16384:]):
+            path.write_bytes(bad)
+            assert damage.damage(path)
+
+    def test_a_check_that_is_cut_short_calls_nothing_damaged(self, store, path):
+        with store.transaction():
+            for n in range(20_000):
+                store.note(file(f"file {n}"), 0.0)
+        store.close()
+        assert [damage.damage(path, seconds) for seconds in np.linspace(0.0, 0.01, 10)] == [None] * 10
+
+    def test_all_of_it_is_renamed_and_a_second_time_does_not_hide_the_first(self, store, path):
+        store.note(file("a"), 0.0)  # is in the log still
+        first = damage.set_aside(path, 0.0)
+        assert first.name == path.name + ".damaged-19700101T000000Z"
+        assert not list(path.parent.glob(path.name + "-*"))
+        path.write_bytes(b"")
+        second = damage.set_aside(path, 0.0)
+        assert damage.asides(path) == [first, second]
+        with closing(Store.reading(first)) as old:
+            assert old.counts() == {Status.TAKEN: 1}
+
+    def test_what_was_told_is_saved_once(self, store, path):
+        store.post(alert("a"), ["mail"], 1.0)
+        store.post(alert("b"), ["mail", "slack"], 1.0)
+        store.say("electa", Said(surfaced=5.0), [], lambda a: [], 1.0)
+        store._db.execute("UPDATE outbox SET delivered_at = 2 WHERE alert = 'a'")
+        store._db.execute("UPDATE alerts SET data = '{' WHERE id = 'b'")
+        store.post(alert("c"), ["mail"], 1.0)
+        store.close()
+        aside = damage.set_aside(path, 0.0)
+        saved = []
+
+        def report(n: int) -> Alert:
+            saved.append(n)
+            return alert("damaged", body=f"{n} saved")
+
+        assert damage.restore(path, aside, report, ["mail"]) is not None
+        assert damage.restore(path, aside, report, ["mail"]) is None
+        with closing(Store.open(path)) as new:
+            assert [a.id for a in new.alerts()] == ["a", "c", "damaged"] and saved[1] == 2
+            assert [u.alert for u in new.undelivered()] == ["c", "damaged"]
+            assert new.said("electa") == Said(surfaced=5.0)
 
 
 class TestReading:

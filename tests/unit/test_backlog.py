@@ -124,3 +124,15 @@ def test_two_files_of_one_segment_are_both_kept() -> None:
     for path in ("/long.sbd", "/00010001.sbd"):
         backlog.add(job("a", 1.0, path))
     assert [j.file.path for j in started(backlog, 3)] == ["/00010001.sbd", "/long.sbd"]
+
+
+def test_a_glider_that_had_nothing_at_hand_is_next():
+    backlog = Backlog()
+    for glider in ("a", "b", "c"):
+        for opened_at in (1.0, 2.0, 3.0):
+            backlog.add(job(glider, opened_at))
+    assert [j.header.id.glider for j in started(backlog, 4)] == ["a", "b", "c", "a"]
+    backlog.add(job("d", 9.0))
+    backlog.add(job("d", 10.0))
+    assert [j.header.id.glider for j in started(backlog, 4)] == ["d", "b", "c", "a"]
+    assert (backlog.behind("d"), backlog.behind("a"), backlog.behind("e")) == (2, 3, 0)

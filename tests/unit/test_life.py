@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from gliderwatch.errors import StateError
 from gliderwatch.run.life import Life, alive_path, is_held, silence
-from gliderwatch.store.database import StateError
 
 
 @pytest.fixture

@@ -8,18 +8,14 @@ from __future__ import annotations
 
 import logging
 import re
-import smtplib
-import socket
-import ssl
 import threading
-from contextlib import suppress
-from email.errors import MessageError
 from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
-from gliderwatch.alerts.mail import Envelope, compose
-from gliderwatch.errors import GliderwatchError
+from gliderwatch.alerts.smtp import DeliveryError, envelope_of, first, is_permanent, submit
 from gliderwatch.model import Alert, Kind, Severity
+
+__all__ = ["Channel", "DeliveryError", "problem", "scrub"]
 
 READ_TIMEOUT = 15.0
 """Seconds to wait for an answer where the URL does not say (``rto=``): a message taken but not
@@ -27,14 +23,19 @@ confirmed in time is sent again, so that Apprise's 4 s would make duplicates at 
 
 HIDDEN = "***"
 
+_HTTP_ERROR = re.compile(r"\berror=(\d{3})\b")
+"""How Apprise tells the status of an answer in its log."""
+_PASSING = frozenset({408, 425, 429})
+"""Answers of a web server to a request that may be good later; the other 4xx are for good."""
+
 OPEN_KEYS = frozenset(
     {"smtp", "mode", "from", "to", "cc", "name", "format", "overflow", "cto", "rto", "verify"}
 )
 """Keys of a URL's query whose values are no secrets and tell what failed."""
 
 
-class DeliveryError(GliderwatchError):
-    """A message was not surely delivered. The text holds no secret of the channel's URL."""
+_LIVE = re.compile(r"@(?=\w)|\](?=\()")
+"""Where a name from a file could begin a mention or a link, in services that read every text as Markdown."""
 
 
 class Channel:
@@ -45,6 +46,7 @@ class Channel:
         self._url = url
         self._service: Any = None
         self._accepted: dict[str, set[str]] = {}
+        self._refused: dict[str, dict[str, tuple[int, bytes]]] = {}
 
     def __repr__(self) -> str:
         return f"Channel({self.name!r})"
@@ -66,22 +68,30 @@ class Channel:
             else:
                 _notify(self._service, alert)
         except DeliveryError as error:
-            raise DeliveryError(scrub(str(error), self._url)) from None
+            raise DeliveryError(scrub(str(error), self._url), permanent=error.permanent) from None
 
     def _send_mail(self, alert: Alert) -> None:
-        """Deliver to every recipient; those who accepted it are not asked again at the next try."""
-        envelope = _envelope(self._service)
-        accepted = self._accepted.setdefault(alert.id, set())
-        rest = [address for address in envelope.recipients if address not in accepted]
-        if not rest:
+        """Deliver to every recipient; those who took or refused it for good are not asked again."""
+        envelope = envelope_of(self._service)
+        if not envelope.recipients:
             raise DeliveryError("the URL names no valid address to send to")
-        refused = _submit(self._service, alert, envelope, rest)
-        accepted.update(set(rest) - set(refused))
-        if refused:
+        refused = self._refused.setdefault(alert.id, {})
+        done = self._accepted.setdefault(alert.id, set())
+        rest = [address for address in envelope.recipients if address not in done | set(refused)]
+        answers = submit(self._service, alert, envelope, rest) if rest else {}
+        later = {address: answer for address, answer in answers.items() if not is_permanent(answer[0])}
+        done.update(set(rest) - set(answers))
+        refused.update({address: answer for address, answer in answers.items() if address not in later})
+        if later:  # greylisted, a full mailbox
             raise DeliveryError(
-                f"mail server refused {len(refused)} of {len(rest)} recipients: {_first(refused)}"
+                f"mail server refused {len(later)} of {len(rest)} recipients for now: {first(later)}"
             )
-        self._accepted.pop(alert.id, None)
+        del self._accepted[alert.id], self._refused[alert.id]
+        if refused:
+            n = len(envelope.recipients)
+            raise DeliveryError(
+                f"mail server refused {len(refused)} of {n} recipients: {first(refused)}", permanent=True
+            )
 
 
 def problem(url: str) -> str | None:
@@ -99,7 +109,7 @@ def problem(url: str) -> str | None:
 
 def _dropped(service: Any, url: str) -> list[str]:
     """What stands for an address in the URL of a mail channel but is none: Apprise leaves it out silently."""
-    taken = [address.lower() for address in _envelope(service).recipients]
+    taken = [address.lower() for address in envelope_of(service).recipients]
     given = parse_qs(url.partition("?")[2])
     parts = [
         part.strip()
@@ -205,8 +215,8 @@ def _notify(service: Any, alert: Alert) -> None:
     one.add(service)
     try:
         result = one.notify(
-            body=alert.body,
-            title=alert.title,
+            body=_dead(alert.body),
+            title=_dead(alert.title),
             notify_type=_notify_type(alert),
             body_format=apprise.NotifyFormat.TEXT,
         )
@@ -217,81 +227,19 @@ def _notify(service: Any, alert: Alert) -> None:
     if sent and result.results and all(any(r.attempts) for r in result.results):
         return
     reasons = "; ".join(dict.fromkeys(entry.message for entry in result.logs()))
-    raise DeliveryError(f"{service.service_name}: {reasons or result.status.name.lower()}")
+    codes = {int(code) for code in _HTTP_ERROR.findall(reasons)}
+    raise DeliveryError(
+        f"{service.service_name}: {reasons or result.status.name.lower()}",
+        permanent=bool(codes) and all(400 <= code < 500 and code not in _PASSING for code in codes),
+    )
+
+
+def _dead(text: str) -> str:
+    """Text in which nothing calls people or leads away: a space of no width parts what would."""
+    return _LIVE.sub("\\g<0>\u200b", text)
 
 
 def _notify_type(alert: Alert) -> str:
     if alert.kind is Kind.ALL_CLEAR:
         return "success"
     return {Severity.INFO: "info", Severity.WARNING: "warning", Severity.CRITICAL: "failure"}[alert.severity]
-
-
-def _envelope(service: Any) -> Envelope:
-    def person(address: str) -> tuple[str, str]:
-        return (service.names.get(address) or "", address)
-
-    return Envelope(
-        sender=(service.from_addr[0] or "gliderwatch", service.from_addr[1]),
-        to=[(name or "", address) for name, address in service.targets],
-        cc=[person(address) for address in sorted(service.cc)],
-        bcc=sorted(service.bcc),
-        reply_to=[person(address) for address in sorted(service.reply_to)],
-        headers=service.headers,
-    )
-
-
-def _submit(
-    service: Any, alert: Alert, envelope: Envelope, recipients: list[str]
-) -> dict[str, tuple[int, bytes]]:
-    """Hand the mail to the server; returns who was refused. Raises DeliveryError when nobody was served."""
-    server = f"mail server {service.smtp_host}:{service.port}"
-    try:
-        mail = compose(alert, envelope)
-        smtp = _connect(service)
-        try:
-            return smtp.send_message(mail, envelope.sender[1], recipients)
-        finally:
-            # once the server took the message, a lost goodbye must not send it again
-            with suppress(OSError, smtplib.SMTPException):
-                smtp.quit()
-            smtp.close()
-    except smtplib.SMTPRecipientsRefused as error:
-        return error.recipients
-    except smtplib.SMTPResponseException as error:
-        raise DeliveryError(f"{server}: {error.smtp_code} {_decode(error.smtp_error)}") from None
-    except (OSError, smtplib.SMTPException, ValueError, MessageError) as error:
-        raise DeliveryError(f"{server}: {str(error) or type(error).__name__}") from None
-
-
-def _connect(service: Any) -> smtplib.SMTP:
-    """A connection as the URL asks for it, logged in."""
-    context = ssl.create_default_context()
-    if not service.verify_certificate:
-        context.check_hostname = False
-        context.verify_mode = ssl.CERT_NONE
-    timeout = service.socket_connect_timeout
-    name = socket.gethostname()  # without it smtplib asks the DNS for our own name, which may hang
-    if service.secure_mode == "ssl":
-        smtp: smtplib.SMTP = smtplib.SMTP_SSL(
-            service.smtp_host, service.port, name, timeout=timeout, context=context
-        )
-    else:
-        smtp = smtplib.SMTP(service.smtp_host, service.port, name, timeout=timeout)
-    try:
-        if service.secure_mode == "starttls":
-            smtp.starttls(context=context)
-        if service.user and service.password:
-            smtp.login(service.user, service.password)
-    except BaseException:
-        smtp.close()
-        raise
-    return smtp
-
-
-def _first(refused: dict[str, tuple[int, bytes]]) -> str:
-    code, text = next(iter(refused.values()))
-    return f"{code} {_decode(text)}"
-
-
-def _decode(text: bytes | str) -> str:
-    return " ".join((text.decode("utf-8", "replace") if isinstance(text, bytes) else text).split())

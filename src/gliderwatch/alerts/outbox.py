@@ -1,8 +1,9 @@
 """The dispatcher: one thread takes what is due out of the outbox, one worker a channel delivers it.
 
-At least once: a row is marked delivered after its channel said so, and never given up. A channel
-that is slow or down delays no other. Messages of one incident go to one channel in their order:
-the store holds back a row while an older one of the same incident and channel is undelivered.
+At least once: a row is marked delivered after its channel said so, and tried until then. Given up is only
+what a channel refuses for good, and that is reported over the others. A channel that is slow or down delays
+no other. Messages of one incident go to one channel in their order: the store holds back a row while an older
+one of the same incident and channel is undelivered.
 """
 
 from __future__ import annotations
@@ -10,17 +11,18 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
-from queue import SimpleQueue
 from typing import Protocol
 from zlib import crc32
 
 import structlog
 
-from gliderwatch.alerts.channels import DeliveryError
-from gliderwatch.model import Alert
+from gliderwatch.alerts import message
+from gliderwatch.alerts.worker import OutboxRow, Result, Sender, Worker
+from gliderwatch.model import Alert, Severity
+
+__all__ = ["Dispatcher", "OutboxRow", "OutboxStore", "Sender", "retry_delay"]
 
 log = structlog.get_logger(__name__)
 
@@ -28,18 +30,10 @@ FIRST_DELAY = 5.0
 LONGEST_DELAY = 900.0
 HEARTBEAT = 5.0
 """Seconds between two passes when nothing wakes the dispatcher."""
+_REPORT = "refused/"
+"""How the ids of reports of refusals begin."""
 SEND_LIMIT = 90.0
 """Seconds after which a send that has not come back counts as failed."""
-
-
-@dataclass(frozen=True, slots=True)
-class OutboxRow:
-    """One alert for one channel; ``attempts`` counts the failed ones so far."""
-
-    id: int
-    alert: Alert
-    channel: str
-    attempts: int
 
 
 class OutboxStore(Protocol):
@@ -64,20 +58,22 @@ class OutboxStore(Protocol):
         """
         ...
 
+    def refused(
+        self, row_id: int, error: str, now: float, report: Alert | None, channels: Iterable[str]
+    ) -> None:
+        """Give a row up, keep its reason, post `report` to other channels, and commit both as one."""
+        ...
+
+    def park(self, row_id: int, error: str) -> None:
+        """Make a row due no more until `adopt` knows its channel, and commit."""
+        ...
+
+    def adopt(self, channels: Iterable[str]) -> None:
+        """Make parked rows due whose channel is one of these, and commit."""
+        ...
+
     def close(self) -> None:
         """Give the connection back."""
-        ...
-
-
-class Sender(Protocol):
-    """What the dispatcher needs of a channel (`channels.Channel`)."""
-
-    def prepare(self) -> None:
-        """Load what the first message would otherwise wait for."""
-        ...
-
-    def send(self, alert: Alert) -> None:
-        """Deliver, or raise DeliveryError."""
         ...
 
 
@@ -92,54 +88,6 @@ def retry_delay(attempts: int, row_id: int) -> float:
     """
     delay = min(FIRST_DELAY * 2.0 ** min(attempts - 1, 30), LONGEST_DELAY)
     return delay * (1 + 0.1 * crc32(f"{row_id}:{attempts}".encode()) / 2**32)
-
-
-@dataclass(frozen=True, slots=True)
-class _Result:
-    """What became of a row: no ``error`` means delivered."""
-
-    row: OutboxRow
-    error: str | None
-    seconds: float
-    worker: _Worker
-
-
-class _Worker:
-    """The thread of one channel: sends one row at a time and reports to the dispatcher."""
-
-    def __init__(self, name: str, channel: Sender, report: Callable[[_Result], None]) -> None:
-        self.name, self.channel, self._report = name, channel, report
-        self.row: OutboxRow | None = None
-        self.since = 0.0
-        self._inbox: SimpleQueue[OutboxRow | None] = SimpleQueue()
-        self._thread = threading.Thread(target=self._run, name=f"channel-{name}", daemon=True)
-        self._thread.start()
-
-    def give(self, row: OutboxRow) -> None:
-        """Let it send a row; only while ``row`` is None."""
-        self.row, self.since = row, time.monotonic()
-        self._inbox.put(row)
-
-    def end(self) -> None:
-        """Let the thread end after what it does now."""
-        self._inbox.put(None)
-
-    def alive(self) -> bool:
-        """Whether the thread runs."""
-        return self._thread.is_alive()
-
-    def _run(self) -> None:
-        with suppress(Exception):  # the first send tells what is wrong with the channel
-            self.channel.prepare()
-        while (row := self._inbox.get()) is not None:
-            begun, error = time.monotonic(), None
-            try:
-                self.channel.send(row.alert)
-            except DeliveryError as failure:
-                error = str(failure)
-            except Exception as failure:  # a text of unknown making could hold a secret
-                error = f"unexpected {type(failure).__name__}"
-            self._report(_Result(row, error, time.monotonic() - begun, self))
 
 
 class Dispatcher:
@@ -160,8 +108,8 @@ class Dispatcher:
     ) -> None:
         self._open, self._channels, self._clock, self._wake = open_store, dict(channels), clock, wake
         self._delay, self._limit = delay, limit
-        self._results: deque[_Result] = deque()
-        self._workers: dict[str, _Worker] = {}
+        self._results: deque[Result] = deque()
+        self._workers: dict[str, Worker] = {}
         self._waiting: dict[int, float] = {}
         self._give_up_at: float | None = None
         self._beat = time.monotonic()
@@ -191,18 +139,22 @@ class Dispatcher:
 
     def _run(self) -> None:
         store: OutboxStore | None = None
+        trouble = ""
         for name, channel in self._channels.items():
-            self._workers[name] = _Worker(name, channel, self._report)
+            self._workers[name] = Worker(name, channel, self._report)
         while not self._finished():
             self._wake.clear()
             try:
-                store = store or self._open()
+                if store is None:
+                    store = self._open()
+                    store.adopt(self._channels)
                 pause = self._pass(store)
+                trouble, self._beat = "", time.monotonic()
             except Exception as error:  # a locked or full disk passes: this thread must not end by it
-                log.error("outbox cannot be read or written", error=f"{type(error).__name__}: {error}")
+                if (told := f"{type(error).__name__}: {error}") != trouble:
+                    log.error("outbox cannot be read or written", error=told)
                 _close(store)
-                store, pause = None, 1.0
-            self._beat = time.monotonic()
+                store, pause, trouble = None, 1.0, told
             self._wake.wait(pause)
         _close(store)
         for worker in self._workers.values():
@@ -215,7 +167,7 @@ class Dispatcher:
         busy = any(w.row is not None for w in self._workers.values())  # until its result is noted
         return not busy or time.monotonic() >= end
 
-    def _report(self, result: _Result) -> None:
+    def _report(self, result: Result) -> None:
         self._results.append(result)
         self._wake.set()
 
@@ -231,20 +183,24 @@ class Dispatcher:
         for row in sorted(store.due(now), key=lambda r: (-r.alert.severity, r.id)):
             worker = self._workers.get(row.channel)
             if worker is None:
-                self._failed(store, row, "the configuration has no such channel any more")
+                error = "the configuration has no such channel any more: kept until it is there again"
+                store.park(row.id, error)
+                log.warning("alert parked", alert=row.alert.id, channel=row.channel, reason=error)
             elif worker.row is None:
                 self._waiting.pop(row.id, None)
                 worker.give(row)
         # a row that is due but waits for its worker needs no alarm clock: the worker's report wakes us
         return min([HEARTBEAT, self._limit, *(t - now for t in self._waiting.values() if t > now)])
 
-    def _note(self, store: OutboxStore, result: _Result) -> None:
+    def _note(self, store: OutboxStore, result: Result) -> None:
         row, worker = result.row, result.worker
         if result.error is None:
             store.delivered(row.id, self._clock())
             self._waiting.pop(row.id, None)
             seconds = round(result.seconds, 3)
             log.info("alert delivered", alert=row.alert.id, channel=row.channel, seconds=seconds)
+        elif result.refused:
+            self._refused(store, row, result.error)
         elif worker.row is not None:  # else its row was given up before, and counted
             self._failed(store, row, result.error)
         worker.row = None
@@ -259,7 +215,17 @@ class Dispatcher:
                 self._failed(store, worker.row, f"no answer within {self._limit:g} s")
                 worker.row = None
                 worker.end()
-                self._workers[name] = _Worker(name, worker.channel, self._report)
+                self._workers[name] = Worker(name, worker.channel, self._report)
+
+    def _refused(self, store: OutboxStore, row: OutboxRow, error: str) -> None:
+        now, others = self._clock(), [name for name in self._channels if name != row.channel]
+        is_report = row.alert.id.startswith(_REPORT)  # of which no report is made: it would go round
+        report = None if is_report or not others else _report_of(row, error, now)
+        store.refused(row.id, error, now, report, others)
+        self._waiting.pop(row.id, None)
+        log.error("alert refused for good", alert=row.alert.id, channel=row.channel, error=error)
+        if report is not None:
+            self._wake.set()
 
     def _failed(self, store: OutboxStore, row: OutboxRow, error: str) -> None:
         delay = self._delay(row.attempts + 1, row.id)
@@ -273,6 +239,24 @@ class Dispatcher:
             attempts=row.attempts + 1,
             retry_in=round(delay, 1),
         )
+
+
+def _report_of(row: OutboxRow, error: str, now: float) -> Alert:
+    """That a channel refused a message, for the others; one a day, whatever else the channel refuses."""
+    text = (
+        f"Channel {row.channel} refused for good: {error}\n"
+        f"The message: {row.alert.title}\n"
+        "It is not tried again there, nor are others that are refused so; `gliderwatch status` lists them. "
+        f"Correct the channel's URL, then try `gliderwatch test-alert --channel {row.channel}`."
+    )
+    return message.operator(
+        f"channel {row.channel} refuses messages",
+        text,
+        now,
+        alert_id=f"{_REPORT}{row.channel}/{now // 86400:.0f}",
+        severity=Severity.WARNING,
+        audience=Severity.WARNING,
+    )
 
 
 def _close(store: OutboxStore | None) -> None:

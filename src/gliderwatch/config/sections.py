@@ -294,6 +294,10 @@ class State(Section):
         default="/var/lib/gliderwatch/state.sqlite",
         description="The state file; its folder must be writable.",
     )
+    keep_days: Annotated[Number, Field(ge=60, le=36500)] | None = Field(
+        default=None,
+        description="Days after which what is over is removed from it, once a day; null: all is kept.",
+    )
 
 
 class Heartbeat(Section):

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Protocol
 
 from gliderwatch.alerts import message
 from gliderwatch.model import Alert, Assessment, Expected, Incident
+from gliderwatch.rules.acknowledged import Acks
 from gliderwatch.rules.overdue import Silence
 
 NEWS = 86400.0
@@ -21,6 +23,7 @@ SPEED_CHANGE = 0.05
 """m/s: a smaller change of a speed that was told is not worth a correction."""
 FLOW_CHANGE = 0.05
 """m/s: the same for the reference flow."""
+NO_ACKS: Acks = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,10 +65,13 @@ class Known(Protocol):
         """The last dive that has ended with a fix and surfaced at `until` (s) or before."""
 
 
-def due(said: Said, known: Known, reminder_hours: float | None, notices: bool) -> tuple[Said, list[Alert]]:
+def due(
+    said: Said, known: Known, reminder_hours: float | None, notices: bool, acks: Acks = NO_ACKS
+) -> tuple[Said, list[Alert]]:
     """The messages to send now, and what will have been said then.
 
-    `notices`: whether anyone wants a notice of each surfacing.
+    `notices`: whether anyone wants a notice of each surfacing. An incident that somebody has acknowledged
+    (`acks`) is not brought to mind, unless it has grown worse since.
     """
     latest = known.last_surfacing(float("inf"))
     if latest is None:
@@ -75,7 +81,9 @@ def due(said: Said, known: Known, reminder_hours: float | None, notices: bool) -
     incidents = known.incidents()
     matched = _matched(said.threads, incidents)
     for before in said.threads:
-        thread, more = _continued(before, matched.get(before.id), known, latest, reminder_hours)
+        now = matched.get(before.id)
+        hours = None if now is not None and _is_acknowledged(before, now, acks) else reminder_hours
+        thread, more = _continued(before, now, known, latest, hours)
         threads.append(thread)
         alerts += more
     old = {i.id for i in matched.values()}
@@ -96,6 +104,39 @@ def due(said: Said, known: Known, reminder_hours: float | None, notices: bool) -
         surfaced = latest.t_surface
     said = replace(said, threads=tuple(threads), surfaced=surfaced)
     return said, sorted(alerts, key=lambda a: a.time)
+
+
+def as_told(said: Said, known: Known) -> Said:
+    """What was said, as of what is known after all was assessed anew by other code or parameters.
+
+    Nobody is told old things anew: no corrections of what is over, nor of details. What is left to `due` is
+    what matters now: an incident that is open and was not told, or was told to be open and is not.
+    """
+    latest, incidents = known.last_surfacing(float("inf")), known.incidents()
+    if latest is None:
+        return said
+    matched, threads = _matched(said.threads, incidents), list[Thread]()
+    for thread in said.threads:
+        now = matched.get(thread.id)
+        was_open = thread.told.cleared_at is None and not thread.withdrawn
+        if was_open != (now is not None and now.cleared_at is None):
+            threads.append(thread)
+        elif now is None:
+            threads.append(replace(thread, withdrawn=True))
+        else:
+            dive = known.dive(thread.dive.t_dive) or known.last_surfacing(thread.dive.t_surface) or now.last
+            threads.append(replace(thread, told=now, dive=dive, withdrawn=False))
+    old = {i.id for i in matched.values()} | {t.id for t in threads}
+    for i in incidents:
+        if i.id not in old and i.cleared_at is not None and _is_news(i, latest):
+            threads.append(Thread(i.id, i, i.last, 0, latest.t_surface))
+    return replace(said, threads=tuple(threads))
+
+
+def _is_acknowledged(thread: Thread, now: Incident, acks: Acks) -> bool:
+    """Whether somebody has taken an incident on, as bad as it is; late data may have changed its id."""
+    ack = acks.get(now.id) or acks.get(thread.id)
+    return ack is not None and ack.holds(now)
 
 
 def _is_another(dive: Assessment, surfaced: float | None) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import heapq
 from collections import OrderedDict, deque
 from dataclasses import dataclass, field
+from itertools import chain
 
 from gliderwatch.ingest.header import Header
 from gliderwatch.model import Segment
@@ -33,12 +34,13 @@ class _Queue:
 class Backlog:
     """Oldest first within each glider, so that nothing has to be taken back; gliders take turns.
 
-    One glider with a month of files delays no other, and one file that takes long to decode delays its own
-    glider alone. ``decoding`` counts the files that are being decoded.
+    One glider with a month of files delays no other: one that had none at hand is next. A file that takes
+    long to decode delays its own glider alone. ``decoding`` counts the files that are being decoded.
     """
 
     def __init__(self) -> None:
         self._queues: OrderedDict[str, _Queue] = OrderedDict()
+        self._new: dict[str, None] = {}
         self._paths: set[str] = set()
         self.decoding = 0
 
@@ -50,16 +52,22 @@ class Backlog:
         if job.file.path in self._paths:
             return
         self._paths.add(job.file.path)
-        queue = self._queues.setdefault(job.header.id.glider, _Queue())
+        glider = job.header.id.glider
+        if glider not in self._queues:  # a file that just came does not wait for a round of all gliders
+            self._queues[glider] = _Queue()
+            self._new[glider] = None
+        queue = self._queues[glider]
         heapq.heappush(queue.waiting, (job.header.id.opened_at, job.header.id.name, job.file.path, job))
 
     def next(self) -> Job | None:
         """The file to decode next, None when there is none."""
-        for glider, queue in self._queues.items():
+        for glider in chain(self._new, self._queues):
+            queue = self._queues[glider]
             if queue.waiting and len(queue.decoding) < AHEAD:
                 job = heapq.heappop(queue.waiting)[-1]
                 queue.decoding.append(job)
                 self._queues.move_to_end(glider)
+                self._new.pop(glider, None)
                 self.decoding += 1
                 return job
         return None
@@ -83,3 +91,8 @@ class Backlog:
     def more(self, glider: str) -> bool:
         """Whether more files of a glider are at hand."""
         return glider in self._queues
+
+    def behind(self, glider: str) -> int:
+        """How many more files of a glider are at hand."""
+        queue = self._queues.get(glider)
+        return 0 if queue is None else len(queue.waiting) + len(queue.decoding)

@@ -11,6 +11,7 @@ import signal
 import threading
 import time
 from collections import deque
+from dataclasses import replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from types import FrameType
@@ -29,6 +30,7 @@ from gliderwatch.run.life import BEAT, Life
 from gliderwatch.run.parts import Decoded, News, Parts, build
 from gliderwatch.run.ticking import Ticking
 from gliderwatch.run.trouble import Trouble
+from gliderwatch.store.retention import Retention
 from gliderwatch.store.sqlite import File, Status
 
 log = structlog.get_logger(__name__)
@@ -47,6 +49,7 @@ class Daemon:
         self._store = recovery.open_state(config)
         self._trouble = Trouble(self._store, self._is_stopping)
         self._ticking = Ticking(self._store)
+        self._retention = Retention(self._store.remove, time.time(), time.monotonic())
         with recovery.setting_aside(self._state), self._store.guarded():
             self._upkeep = Upkeep(config, self._store)
         self._news: SimpleQueue[News] = SimpleQueue()
@@ -119,6 +122,8 @@ class Daemon:
             self._catch_up()
         if self._caught_up and time.monotonic() >= self._next_tick:
             self._tick()
+        if self._is_idle():
+            self._retention.turn(self._parts.config.state.keep_days, time.time(), time.monotonic())
         if time.monotonic() >= self._next_beat:
             self._beat()
 
@@ -128,7 +133,12 @@ class Daemon:
         settled = 0.0 if self._settled else self._parts.settling.next_deadline(now)
         due = [self._next_scan - now, self._next_beat - now, BEAT if settled is None else settled]
         due += [self._next_tick - now] if self._caught_up else []
+        due += [self._retention.pause(now)] if self._is_idle() else []
         return max(0.0, min(due))
+
+    def _is_idle(self) -> bool:
+        """Whether no file is at hand."""
+        return self._caught_up and not self._settled and not self._parts.backlog
 
     def _hear(self, pause: float) -> None:
         """Wait for news and heed what has come by then; what comes meanwhile has its turn later."""
@@ -242,6 +252,10 @@ class Daemon:
 
     def _take_in(self, file: File, segment: Segment) -> None:
         glider = segment.id.glider
+        if self._store.is_past(segment.id):
+            reason = "older than what state.keep_days keeps"
+            self._note(replace(file, status=Status.DUPLICATE, reason=reason, opened_at=None))
+            return
         params, speaking = self._parts.config.glider(glider), self._speaking(glider)
         begun = time.monotonic()
         try:

@@ -122,7 +122,7 @@ def _outlooks(
 
 def next_tick(store: Store, glider: str, speaking: Speaking, now: float) -> float | None:
     """When `tick` has something to say of a glider next (s), None: never."""
-    attention = speaking.attention(glider)
+    attention = store.notes.heeded(glider, speaking.attention(glider))
     if attention.recovered:
         return None
     at = overdue.next_tick(store.said(glider).silences, store.known(glider), attention.overdue_hours, now)
@@ -165,12 +165,16 @@ def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: 
 def _speak(
     store: Store, glider: str, params: GliderParams, speaking: Speaking | None, now: float
 ) -> tuple[Alert, ...]:
-    if speaking is None or speaking.attention(glider).is_quiet(now):
+    if speaking is None or store.notes.heeded(glider, speaking.attention(glider)).is_quiet(now):
         return ()
     before, known = store.said(glider), store.known(glider)
     silences, heard = overdue.hear(before.silences, known, now)
     said, alerts = due(
-        replace(before, silences=silences), known, params.rules.reminder_hours, speaking.notices(glider)
+        replace(before, silences=silences),
+        known,
+        params.rules.reminder_hours,
+        speaking.notices(glider),
+        store.notes.acks(glider),
     )
     alerts = [*heard, *alerts]
     if said != before or alerts:

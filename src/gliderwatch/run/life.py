@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from typing import BinaryIO
 
-from gliderwatch.store.database import StateError
+from gliderwatch.errors import StateError
 
 BEAT = 10.0
 """Seconds between two signs of life."""
@@ -22,7 +22,7 @@ class Life:
     """The lock of a state file, held from now on. Raises StateError where another daemon holds it."""
 
     def __init__(self, state: Path) -> None:
-        self._file = _open(alive_path(state))
+        self._folder, self._file = state.parent, _open(alive_path(state))
         deadline = time.monotonic() + _PATIENCE
         while not _try(self._file, fcntl.LOCK_EX):
             if time.monotonic() > deadline:
@@ -31,8 +31,14 @@ class Life:
             time.sleep(0.05)
 
     def beat(self) -> None:
-        """Give a sign of life."""
-        os.utime(self._file.fileno())
+        """Give a sign of life. Raises StateError where its folder cannot be written any more."""
+        try:
+            os.utime(self._file.fileno())
+        except OSError as error:
+            raise StateError(
+                f"folder {self._folder} cannot be written: {error.strerror}. "
+                "Let the user of the service write there, on a disk that is not mounted read-only"
+            ) from None
 
     def end(self) -> None:
         """Let go of the lock."""

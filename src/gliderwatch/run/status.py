@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from gliderwatch.config import Config
 from gliderwatch.model import Assessment, Expected, Incident
 from gliderwatch.params import Attention
+from gliderwatch.rules.acknowledged import Acks
 from gliderwatch.rules.overdue import RECENT
 from gliderwatch.rules.silence import GONE, Awaited, awaited, guess
 from gliderwatch.run.life import STALE, is_held, silence
 from gliderwatch.run.lines import assessment_line, iso
+from gliderwatch.run.manage.incidents import ack_json
 from gliderwatch.store.sqlite import File, Status, Store, Undelivered
 
 WEEK = 7 * 86400.0
@@ -24,7 +26,8 @@ WEEK = 7 * 86400.0
 class GliderStatus:
     """One glider: its last dive that ended, the open incidents, how many segments and dives are known.
 
-    ``expected`` and ``awaited``: the next surfacing, as known ``at`` a time (s).
+    ``expected`` and ``awaited``: the next surfacing, as known ``at`` a time (s). ``acks``: who has taken
+    incidents on.
     """
 
     name: str
@@ -37,6 +40,7 @@ class GliderStatus:
     attention: Attention = Attention()
     expected: Expected | None = None
     awaited: Awaited | None = None
+    acks: Acks = field(default_factory=dict)
 
     @property
     def is_over(self) -> bool:
@@ -107,11 +111,13 @@ def _glider(store: Store, name: str, config: Config, now: float) -> GliderStatus
     segments, dives = store.extent(name)
     latest = store.last_surfacing(name, float("inf"))
     incidents = tuple(i for i in store.incidents(name) if i.cleared_at is None)
-    attention, signs = config.attention(name), store.signs(name, now - RECENT)
+    attention = store.notes.heeded(name, config.attention(name))
+    signs, acks = store.signs(name, now - RECENT), store.notes.acks(name)
     expected = store.expected(name, now) or guess(signs, now)
     call = awaited(expected, signs, now, attention.overdue_hours) if expected is not None else None
+    configured = name in config.gliders
     return GliderStatus(
-        name, name in config.gliders, segments, dives, latest, incidents, now, attention, expected, call
+        name, configured, segments, dives, latest, incidents, now, attention, expected, call, acks
     )
 
 
@@ -126,7 +132,7 @@ def as_json(view: Overview) -> dict[str, Any]:
                 "segments": g.segments,
                 "dives": g.dives,
                 "latest": assessment_line(g.latest) if g.latest is not None else None,
-                "incidents": [_incident(i) for i in g.incidents],
+                "incidents": [_incident(i, g.acks) for i in g.incidents],
                 **_silence(g),
             }
             for g in view.gliders
@@ -142,7 +148,8 @@ def as_json(view: Overview) -> dict[str, Any]:
     }
 
 
-def _incident(i: Incident) -> dict[str, Any]:
+def _incident(i: Incident, acks: Acks) -> dict[str, Any]:
+    ack = acks.get(i.id)
     return {
         "id": i.id,
         "kind": str(i.kind),
@@ -150,6 +157,7 @@ def _incident(i: Incident) -> dict[str, Any]:
         "since": iso(i.since),
         "opened_at": iso(i.opened_at),
         "dives": i.dives,
+        "acknowledged": None if ack is None else ack_json(ack, i),
     }
 
 

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import msgspec
 import numpy as np
 
-from gliderwatch.errors import GliderwatchError
+from gliderwatch.errors import DamagedError, GliderwatchError
 from gliderwatch.model import readonly
 
 VERSION = 1
@@ -40,8 +40,11 @@ def encode(value: object) -> bytes:
 
 
 def decode(record: bytes, kind: type[T]) -> T:
-    """The value of a record. Raises UnknownVersionError, or msgspec.ValidationError if it is damaged."""
-    parsed = msgspec.json.decode(zlib.decompress(record), type=_Record)
+    """The value of a record. Raises UnknownVersionError, or DamagedError where it is no such value."""
+    try:
+        parsed = msgspec.json.decode(zlib.decompress(record), type=_Record)
+    except (zlib.error, msgspec.MsgspecError, UnicodeError) as error:
+        raise _damaged(error) from error
     if parsed.v != VERSION:
         raise UnknownVersionError(
             f"the state file holds records of version {parsed.v}, this gliderwatch knows {VERSION}: "
@@ -56,8 +59,15 @@ def plain_encode(value: object) -> str:
 
 
 def plain_decode(text: str | bytes | msgspec.Raw, kind: type[T]) -> T:
-    """The value of such a text."""
-    return msgspec.json.decode(text, type=kind, dec_hook=_to_array)
+    """The value of such a text. Raises DamagedError where it is none."""
+    try:
+        return msgspec.json.decode(text, type=kind, dec_hook=_to_array)
+    except (msgspec.MsgspecError, UnicodeError) as error:
+        raise _damaged(error) from error
+
+
+def _damaged(error: Exception) -> DamagedError:
+    return DamagedError(f"a record of the state file is damaged: {error}")
 
 
 def _from_array(value: Any) -> Any:

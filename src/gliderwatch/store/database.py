@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import sqlite3
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from importlib.resources import files
 from pathlib import Path
 
-from gliderwatch.errors import GliderwatchError
+from gliderwatch.errors import DamagedError, StateError
 
-SCHEMA = 2
+__all__ = ["MEMORY", "SCHEMA", "StateError", "connect", "guarded", "read_only", "schema"]
+
+SCHEMA = 3
 MIGRATIONS: dict[int, str] = {
     2: """
 CREATE TABLE expected (           -- the next surfacing, as expected after each segment
@@ -32,14 +35,66 @@ CREATE TABLE heard (              -- signs of life: every segment of which a fil
 CREATE INDEX heard_in_order ON heard (glider, opened_at);
 UPDATE segments SET checkpoint = NULL;  -- a glider's next file has it estimated anew, from all its segments
 """,
+    3: """
+CREATE TABLE mutes (              -- gliders of which nothing is told, by the command `mute`
+    glider TEXT PRIMARY KEY,
+    until  REAL NOT NULL,
+    at     REAL NOT NULL          -- when that was told
+) STRICT;
+CREATE TABLE acks (               -- incidents that somebody has taken on, by the command `ack`
+    incident TEXT PRIMARY KEY,
+    glider   TEXT NOT NULL,
+    at       REAL NOT NULL,
+    data     TEXT NOT NULL
+) STRICT;
+CREATE INDEX acks_by_glider ON acks (glider);
+""",
 }
 """SQL that leads from the schema before to the one of the key. A state file is never written by an older
 gliderwatch than the one that migrated it."""
 MEMORY = ":memory:"
+DAMAGE = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
+"""Codes of SQLite for a file whose content makes no sense."""
+_ROOM = "make room on its disk: it goes on by itself, nothing is lost"
+_WRITE = "let the user of the service write there, on a disk that is not mounted read-only"
+_CURES = {
+    sqlite3.SQLITE_FULL: _ROOM,
+    sqlite3.SQLITE_IOERR: f"see what the kernel says of its disk (dmesg); where that is full, {_ROOM}",
+    sqlite3.SQLITE_READONLY: _WRITE,
+    sqlite3.SQLITE_CANTOPEN: _WRITE,
+    sqlite3.SQLITE_PERM: _WRITE,
+    sqlite3.SQLITE_BUSY: "end the program that holds it locked",
+    sqlite3.SQLITE_LOCKED: "end the program that holds it locked",
+}
 
 
-class StateError(GliderwatchError):
-    """The state file cannot be used; the text says which and what to do."""
+@contextmanager
+def guarded(path: Path | str) -> Iterator[None]:
+    """What SQLite cannot do inside with the file at `path` is raised as StateError or DamagedError.
+
+    Its errors that are mistakes in the program (a constraint, a closed connection) stay what they are.
+    """
+    try:
+        yield
+    except (sqlite3.IntegrityError, sqlite3.ProgrammingError, sqlite3.DataError, sqlite3.NotSupportedError):
+        raise
+    except sqlite3.Error as error:
+        raise _told(path, error) from error
+
+
+def primary(error: sqlite3.Error) -> int:
+    """The primary result code of SQLite (https://sqlite.org/rescode.html); 0 where it gave none."""
+    code: int = getattr(error, "sqlite_errorcode", 0)
+    return code & 0xFF
+
+
+def _told(path: Path | str, error: sqlite3.Error) -> StateError:
+    if primary(error) in DAMAGE:
+        return DamagedError(f"state file {path} is damaged: {error}")
+    cure = _CURES.get(primary(error))
+    return StateError(
+        f"state file {path} cannot be used: {error}" + (f". What to do: {cure}" if cure else "")
+    )
 
 
 def connect(path: Path | str, *, durable: bool = True) -> sqlite3.Connection:
@@ -50,15 +105,17 @@ def connect(path: Path | str, *, durable: bool = True) -> sqlite3.Connection:
     """
     if path != MEMORY:
         _make_folder(Path(path))
-    try:
+    with guarded(path):
         connection = sqlite3.connect(path, timeout=30.0, isolation_level=None, check_same_thread=False)
-        connection.execute("PRAGMA journal_mode = WAL")
-        connection.execute(f"PRAGMA synchronous = {'FULL' if durable else 'OFF'}")
-        connection.execute("PRAGMA foreign_keys = ON")
-        connection.row_factory = sqlite3.Row
-        _migrate(connection, path)
-    except sqlite3.Error as error:
-        raise StateError(f"state file {path} cannot be used: {error}") from None
+        try:
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.execute(f"PRAGMA synchronous = {'FULL' if durable else 'OFF'}")
+            connection.execute("PRAGMA foreign_keys = ON")
+            connection.row_factory = sqlite3.Row
+            _migrate(connection, path)
+        except BaseException:
+            connection.close()
+            raise
     return connection
 
 
@@ -66,12 +123,14 @@ def read_only(path: Path) -> sqlite3.Connection:
     """A connection that only reads, for `status`. Raises StateError where there is no state file."""
     if not path.exists():
         raise StateError(f"there is no state file {path}: has the daemon run with this configuration?")
-    try:
+    with guarded(path):
         connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=30.0)
-        connection.row_factory = sqlite3.Row
-        _check_version(connection.execute("PRAGMA user_version").fetchone()[0], path)
-    except sqlite3.Error as error:
-        raise StateError(f"state file {path} cannot be read: {error}") from None
+        try:
+            connection.row_factory = sqlite3.Row
+            _check_version(connection.execute("PRAGMA user_version").fetchone()[0], path)
+        except BaseException:
+            connection.close()
+            raise
     return connection
 
 

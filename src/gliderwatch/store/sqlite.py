@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlite3
 import zlib
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
@@ -16,9 +16,12 @@ from gliderwatch.navigation.samples import compact
 from gliderwatch.pipeline import GliderState, Outcome
 from gliderwatch.rules.announce import Said
 from gliderwatch.rules.silence import Sign
-from gliderwatch.store import codec
-from gliderwatch.store.database import connect, read_only
+from gliderwatch.store import codec, retention
+from gliderwatch.store.ahead import Ahead
+from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, read_only
 from gliderwatch.store.known import Known
+from gliderwatch.store.notes import Notes
+from gliderwatch.store.outbox import post
 from gliderwatch.store.rows import File, Status, Undelivered, file_of
 
 __all__ = ["File", "Known", "Status", "Store", "Undelivered"]
@@ -33,33 +36,65 @@ T = TypeVar("T")
 class Store:
     """One connection to a state file; used by one thread."""
 
-    def __init__(self, connection: sqlite3.Connection) -> None:
-        self._db = connection
+    def __init__(self, connection: sqlite3.Connection, path: Path | str = MEMORY) -> None:
+        self._db, self._path = connection, path
+        self._ahead, self._following = Ahead(), 0
+        self.notes = Notes(connection)
 
     @classmethod
     def open(cls, path: Path | str, *, durable: bool = True) -> Store:
         """The store at a path, made if need be; `durable` as in `database.connect`. Raises StateError."""
-        return cls(connect(path, durable=durable))
+        return cls(connect(path, durable=durable), path)
 
     @classmethod
     def reading(cls, path: Path) -> Store:
         """The store at a path, for looking only. Raises StateError where there is none."""
-        return cls(read_only(path))
+        return cls(read_only(path), path)
 
     def close(self) -> None:
         """Give the connection back."""
         self._db.close()
 
+    def guarded(self) -> AbstractContextManager[None]:
+        """Inside, what SQLite cannot do is raised as StateError or DamagedError."""
+        return guarded(self._path)
+
     @contextmanager
     def transaction(self) -> Iterator[None]:
-        """All or nothing of what is written inside."""
-        self._db.execute("BEGIN IMMEDIATE")
+        """All or nothing of what is written inside. Raises StateError or DamagedError: nothing is written."""
+        with self.guarded():
+            self._db.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                self._db.execute("COMMIT")
+                self._ahead.commit()
+            except BaseException:
+                self._ahead.rollback()
+                if self._db.in_transaction:  # on a full disk SQLite may have ended it by itself
+                    self._db.execute("ROLLBACK")
+                raise
+
+    @contextmanager
+    def followed_by(self, files: int) -> Iterator[None]:
+        """Inside, inputs of one glider are taken of which so many more files are at hand.
+
+        Then nobody is told anything, and a power cut may take the last of them back, whole: their files are
+        there to be taken again. What is told, or is the last, is on the disk when its transaction ends.
+        """
+        self._following = files
+        if files:
+            self._db.execute("PRAGMA synchronous = NORMAL")
         try:
             yield
-        except BaseException:
-            self._db.execute("ROLLBACK")
-            raise
-        self._db.execute("COMMIT")
+        finally:
+            self._following = 0
+            if files:
+                self._db.execute("PRAGMA synchronous = FULL")
+
+    def probe(self) -> None:
+        """Write something that changes nothing. Raises StateError where that cannot be done."""
+        with self.transaction():
+            self._db.execute(f"PRAGMA user_version = {SCHEMA}")
 
     # ------------------------------------------------------------------ ledger
 
@@ -81,20 +116,9 @@ class Store:
 
     def note(self, file: File, now: float) -> None:
         """Write what became of a file."""
-        self._db.execute(
-            "INSERT OR REPLACE INTO files VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-            (
-                file.path,
-                file.size,
-                file.mtime_ns,
-                file.status,
-                file.glider,
-                file.segment,
-                file.reason,
-                file.crc,
-                now,
-            ),
-        )
+        f = file
+        row = (f.path, f.size, f.mtime_ns, f.status, f.glider, f.segment, f.reason, f.crc, now)
+        self._db.execute("INSERT OR REPLACE INTO files VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
 
     # ---------------------------------------------------------------- segments
 
@@ -121,27 +145,34 @@ class Store:
                 segment.id.name,
                 codec.plain_encode(segment.completeness),
                 codec.encode(thinned),
-                zlib.crc32(segment.id.name.encode()) % SPARSE == 0,
+                _is_milestone(segment.id.name),
             ),
         )
         before = [] if old is None else [SegmentId(old[0], *key)]
         return min([segment.id, *before])
 
     def resume(self, first: SegmentId) -> tuple[GliderState, list[SegmentId]]:
-        """The newest checkpoint before a segment, and the ids of all segments after it, in order of time."""
+        """The newest state before a segment, and the ids of all segments after it, in order of time."""
+        ahead = self._ahead.before(first)
+        if ahead is not None:
+            return ahead[1], self._after(first.glider, ahead[0].opened_at, ahead[0].name)
+        self._ahead.drop(first.glider)
         row = self._db.execute(
             "SELECT opened_at, name, checkpoint FROM segments WHERE glider = ? AND checkpoint IS NOT NULL "
             "AND (opened_at, name) < (?, ?) ORDER BY opened_at DESC, name DESC LIMIT 1",
             (first.glider, first.opened_at, first.name),
         ).fetchone()
-        after = (row[0], row[1]) if row is not None else (float("-inf"), "")
+        if row is None:
+            return GliderState(), self._after(first.glider, float("-inf"), "")
+        return codec.decode(row[2], GliderState), self._after(first.glider, row[0], row[1])
+
+    def _after(self, glider: str, opened_at: float, name: str) -> list[SegmentId]:
         rows = self._db.execute(
             "SELECT opened_at, name FROM segments WHERE glider = ? AND (opened_at, name) > (?, ?) "
             "ORDER BY opened_at, name",
-            (first.glider, *after),
+            (glider, opened_at, name),
         )
-        state = codec.decode(row[2], GliderState) if row is not None else GliderState()
-        return state, [SegmentId(r[0], first.glider, r[1]) for r in rows]
+        return [SegmentId(row[0], glider, row[1]) for row in rows]
 
     def segment(self, identity: SegmentId) -> Segment:
         """A segment that is held."""
@@ -153,9 +184,15 @@ class Store:
     def checkpoint(self, identity: SegmentId, state: GliderState) -> None:
         """Keep the state after a segment, and the surfacing that it leads to expect."""
         key = (identity.glider, identity.name)
+        if self._following:
+            self._ahead.keep(identity, state)
+        else:
+            self._ahead.drop(identity.glider)
+        is_kept = self._following < RECENT or _is_milestone(identity.name)
         self._db.execute(
-            "UPDATE segments SET checkpoint = ? WHERE glider = ? AND name = ?",
-            (codec.encode(state), *key),
+            "UPDATE segments SET checkpoint = ?1 WHERE glider = ?2 AND name = ?3 "
+            "AND (?1 IS NOT NULL OR checkpoint IS NOT NULL)",
+            (codec.encode(state) if is_kept else None, *key),
         )
         self._db.execute("DELETE FROM expected WHERE glider = ? AND segment = ?", key)
         if (e := state.memory.expected) is not None:
@@ -164,13 +201,25 @@ class Store:
 
     def thin(self, glider: str) -> None:
         """Let go of the checkpoints that are not among the `RECENT` newest, but for one in `SPARSE`."""
-        self._db.execute(
-            "UPDATE segments SET checkpoint = NULL "
-            "WHERE glider = ?1 AND checkpoint IS NOT NULL AND NOT milestone AND (opened_at, name) < "
+        rows = self._db.execute(  # of the index alone: `milestone` lies behind the long records of its row
+            "SELECT name FROM segments WHERE glider = ?1 AND checkpoint IS NOT NULL AND (opened_at, name) < "
             "(SELECT opened_at, name FROM segments WHERE glider = ?1 "
             "ORDER BY opened_at DESC, name DESC LIMIT 1 OFFSET ?2)",
             (glider, RECENT - 1),
+        ).fetchall()
+        self._db.executemany(
+            f"UPDATE segments SET checkpoint = NULL WHERE glider = ? AND name = ? "
+            f"AND milestone != {retention.FIRST}",
+            [(glider, row[0]) for row in rows if not _is_milestone(row[0])],
         )
+
+    def is_past(self, identity: SegmentId) -> bool:
+        """Whether a segment is older than what is kept of its glider (`state.keep_days`)."""
+        return retention.is_past(self._db, identity)
+
+    def remove(self, before: float) -> Iterator[int]:
+        """`retention.remove` of all gliders, in steps."""
+        return retention.remove(self._db, self.transaction, self.gliders(), before)
 
     # ----------------------------------------------------------------- results
 
@@ -228,6 +277,12 @@ class Store:
         )
         return next(iter(self._all(sql, (glider, until), Assessment)), None)
 
+    def forecasts(self, glider: str) -> list[Expected]:
+        """What was expected after each segment of a glider, in the order of the segments."""
+        return self._all(
+            "SELECT data FROM expected WHERE glider = ? ORDER BY opened_at, segment", (glider,), Expected
+        )
+
     def expected(self, glider: str, until: float) -> Expected | None:
         """What was expected after the last surfacing at `until` (s) or before."""
         sql = (
@@ -249,7 +304,12 @@ class Store:
 
     def gliders(self) -> list[str]:
         """The gliders of which segments are held."""
-        return [r[0] for r in self._db.execute("SELECT DISTINCT glider FROM segments ORDER BY glider")]
+        sql = (  # from each to the next in the index; DISTINCT would read all of it
+            "WITH RECURSIVE g (name) AS (SELECT min(glider) FROM segments UNION ALL "
+            "SELECT (SELECT min(glider) FROM segments WHERE glider > g.name) FROM g "
+            "WHERE g.name IS NOT NULL) SELECT name FROM g WHERE name IS NOT NULL ORDER BY name"
+        )
+        return [row[0] for row in self._db.execute(sql)]
 
     def extent(self, glider: str) -> tuple[int, int]:
         """How many segments and how many dives of a glider are known."""
@@ -282,14 +342,7 @@ class Store:
 
     def post(self, alert: Alert, channels: Iterable[str], now: float) -> None:
         """Keep one message and put it into the outbox of its channels; a known id is left alone."""
-        self._db.execute(
-            "INSERT OR IGNORE INTO alerts VALUES (?, ?, ?, ?, ?)",
-            (alert.id, alert.glider, alert.time, now, codec.plain_encode(alert)),
-        )
-        self._db.executemany(
-            "INSERT OR IGNORE INTO outbox (alert, channel, incident) VALUES (?, ?, ?)",
-            [(alert.id, channel, alert.incident) for channel in channels],
-        )
+        post(self._db, alert, channels, now)
 
     def alerts(self) -> list[Alert]:
         """All messages, in the order in which they were made."""
@@ -302,5 +355,19 @@ class Store:
         )
         return [Undelivered(*row) for row in rows]
 
+    def refused(self, since: float) -> list[Undelivered]:
+        """What a channel refused for good, or could not be read, since a time (s); oldest first."""
+        rows = self._db.execute(
+            "SELECT alert, channel, attempts, error FROM outbox WHERE delivered_at >= ? AND error != '' "
+            "ORDER BY id",
+            (since,),
+        )
+        return [Undelivered(*row) for row in rows]
+
     def _all(self, sql: str, values: tuple[object, ...], kind: type[T]) -> list[T]:
         return [codec.plain_decode(row[0], kind) for row in self._db.execute(sql, values)]
+
+
+def _is_milestone(name: str) -> bool:
+    """Whether the checkpoint of a segment is kept for good."""
+    return zlib.crc32(name.encode()) % SPARSE == 0

@@ -1,0 +1,110 @@
+"""Handing a mail to its server, with the server and the people that Apprise read from the URL."""
+
+from __future__ import annotations
+
+import smtplib
+import socket
+import ssl
+from contextlib import suppress
+from email.errors import MessageError
+from typing import Any
+
+from gliderwatch.alerts.mail import Envelope, compose
+from gliderwatch.errors import GliderwatchError
+from gliderwatch.model import Alert
+
+
+class DeliveryError(GliderwatchError):
+    """A message was not surely delivered. The text holds no secret of the channel's URL.
+
+    ``permanent``: the same message would be refused again, however often it is tried.
+    """
+
+    def __init__(self, text: str, *, permanent: bool = False) -> None:
+        super().__init__(text)
+        self.permanent = permanent
+
+
+def envelope_of(service: Any) -> Envelope:
+    """Who writes to whom, as Apprise read it from the URL of a mail channel."""
+
+    def person(address: str) -> tuple[str, str]:
+        return (service.names.get(address) or "", address)
+
+    return Envelope(
+        sender=(service.from_addr[0] or "gliderwatch", service.from_addr[1]),
+        to=[(name or "", address) for name, address in service.targets],
+        cc=[person(address) for address in sorted(service.cc)],
+        bcc=sorted(service.bcc),
+        reply_to=[person(address) for address in sorted(service.reply_to)],
+        headers=service.headers,
+    )
+
+
+def submit(
+    service: Any, alert: Alert, envelope: Envelope, recipients: list[str]
+) -> dict[str, tuple[int, bytes]]:
+    """Hand the mail to the server; returns who was refused. Raises DeliveryError when nobody was served."""
+    server = f"mail server {service.smtp_host}:{service.port}"
+    try:
+        mail = compose(alert, envelope)
+    except (ValueError, MessageError) as error:
+        raise DeliveryError(f"cannot be written as a mail: {error}", permanent=True) from None
+    try:
+        smtp = _connect(service)
+        try:
+            return smtp.send_message(mail, envelope.sender[1], recipients)
+        finally:
+            # once the server took the message, a lost goodbye must not send it again
+            with suppress(OSError, smtplib.SMTPException):
+                smtp.quit()
+            smtp.close()
+    except smtplib.SMTPRecipientsRefused as error:
+        return error.recipients
+    except smtplib.SMTPDataError as error:
+        reason = f"{server}: {error.smtp_code} {_decode(error.smtp_error)}"
+        raise DeliveryError(reason, permanent=is_permanent(error.smtp_code)) from None
+    except smtplib.SMTPResponseException as error:  # of the log-in or the sender: that can be mended
+        raise DeliveryError(f"{server}: {error.smtp_code} {_decode(error.smtp_error)}") from None
+    except (OSError, smtplib.SMTPException, ValueError, MessageError) as error:
+        raise DeliveryError(f"{server}: {str(error) or type(error).__name__}") from None
+
+
+def _connect(service: Any) -> smtplib.SMTP:
+    """A connection as the URL asks for it, logged in."""
+    context = ssl.create_default_context()
+    if not service.verify_certificate:
+        context.check_hostname = False
+        context.verify_mode = ssl.CERT_NONE
+    timeout = service.socket_connect_timeout
+    name = socket.gethostname()  # without it smtplib asks the DNS for our own name, which may hang
+    if service.secure_mode == "ssl":
+        smtp: smtplib.SMTP = smtplib.SMTP_SSL(
+            service.smtp_host, service.port, name, timeout=timeout, context=context
+        )
+    else:
+        smtp = smtplib.SMTP(service.smtp_host, service.port, name, timeout=timeout)
+    try:
+        if service.secure_mode == "starttls":
+            smtp.starttls(context=context)
+        if service.user and service.password:
+            smtp.login(service.user, service.password)
+    except BaseException:
+        smtp.close()
+        raise
+    return smtp
+
+
+def is_permanent(code: int) -> bool:
+    """Whether an answer of a mail server is for good (RFC 5321, 4.2.1)."""
+    return 500 <= code < 600
+
+
+def first(refused: dict[str, tuple[int, bytes]]) -> str:
+    """The first of the answers, as text."""
+    code, text = next(iter(refused.values()))
+    return f"{code} {_decode(text)}"
+
+
+def _decode(text: bytes | str) -> str:
+    return " ".join((text.decode("utf-8", "replace") if isinstance(text, bytes) else text).split())

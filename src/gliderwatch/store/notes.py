@@ -1,0 +1,60 @@
+"""What people told gliderwatch by command: mutes, and acknowledgements of incidents."""
+
+from __future__ import annotations
+
+import sqlite3
+from dataclasses import replace
+
+from gliderwatch.params import Attention
+from gliderwatch.rules.acknowledged import Ack, Acks
+from gliderwatch.store import codec
+
+
+class Notes:
+    """The notes of people in a state file, on the connection of its store."""
+
+    def __init__(self, connection: sqlite3.Connection) -> None:
+        self._db = connection
+
+    def heeded(self, glider: str, configured: Attention) -> Attention:
+        """How a glider is taken: of the mute configured and the one told by command the later counts."""
+        until = self.muted_until(glider)
+        if until is None or (configured.muted_until is not None and configured.muted_until >= until):
+            return configured
+        return replace(configured, muted_until=until)
+
+    def muted_until(self, glider: str) -> float | None:
+        """Until when (s) a glider is muted by command; None: it is not."""
+        row = self._one("SELECT until FROM mutes WHERE glider = ?", glider)
+        return None if row is None else float(row[0])
+
+    def mute(self, glider: str, until: float, now: float) -> None:
+        """Tell nothing of a glider until a time (s), in place of what was noted before."""
+        self._db.execute("INSERT OR REPLACE INTO mutes VALUES (?, ?, ?)", (glider, until, now))
+
+    def unmute(self, glider: str) -> None:
+        """Forget a mute."""
+        self._db.execute("DELETE FROM mutes WHERE glider = ?", (glider,))
+
+    def acknowledge(self, glider: str, ack: Ack) -> None:
+        """Keep an acknowledgement, in place of an earlier one of its incident."""
+        row = (ack.incident, glider, ack.at, codec.plain_encode(ack))
+        self._db.execute("INSERT OR REPLACE INTO acks VALUES (?, ?, ?, ?)", row)
+
+    def acks(self, glider: str) -> Acks:
+        """The acknowledgements of a glider's incidents."""
+        if not self._is_there("acks"):
+            return {}
+        rows = self._db.execute("SELECT data FROM acks WHERE glider = ?", (glider,))
+        return {ack.incident: ack for ack in (codec.plain_decode(row[0], Ack) for row in rows)}
+
+    def _one(self, sql: str, glider: str) -> sqlite3.Row | None:
+        if not self._is_there("mutes"):
+            return None
+        row: sqlite3.Row | None = self._db.execute(sql, (glider,)).fetchone()
+        return row
+
+    def _is_there(self, table: str) -> bool:
+        """Whether there is such a table: `status` also reads a file that the service has not migrated yet."""
+        sql = "SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name = ?"
+        return self._db.execute(sql, (table,)).fetchone() is not None

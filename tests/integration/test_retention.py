@@ -1,0 +1,322 @@
+"""What is old is removed: never what is open, what is to be told, or what a late file still needs."""
+
+import shutil
+import sqlite3
+from contextlib import contextmanager
+from dataclasses import replace
+
+import pytest
+
+from acceptance.angus import FILES, angus, put, taken
+from acceptance.support import Daemon, until
+from alert_support import alert
+from gliderwatch.model import SegmentId
+from gliderwatch.params import GliderParams
+from gliderwatch.rules.announce import Said
+from gliderwatch.run import intake
+from gliderwatch.run.intake import Speaking
+from gliderwatch.store import retention
+from gliderwatch.store.damage import damage
+from gliderwatch.store.outbox import Outbox
+from gliderwatch.store.retention import DAY, HOUR, Retention
+from gliderwatch.store.sqlite import RECENT, File, Status, Store
+from missions import Leg, ending, feed, mission, opened
+
+PARAMS = GliderParams(speed_min=0.2, speed_max=0.4, speed_learnt=False)
+ALL = Speaking(channels=lambda alert: ["mail"], notices=lambda glider: False)
+HEALTHY, SICK = Leg(speed=0.3), Leg(speed=0.08)
+LEGS = [SICK if 4 <= k < 8 else replace(HEALTHY, heading=0.3 * k) for k in range(RECENT + 26)]
+CUT = opened(LEGS, 70)
+TABLES = ("segments", "assessments", "incidents", "expected", "heard", "said", "alerts", "outbox", "files")
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A state file of a mission with an incident that is over, told and delivered."""
+    path = tmp_path_factory.mktemp("whole") / "state.sqlite"
+    store = feed(mission(LEGS), PARAMS, ALL, Store.open(path))
+    store._db.execute("UPDATE outbox SET delivered_at = 1.0")
+    store._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    assert [i.cleared_at is not None for i in store.incidents("unit")] == [True]
+    store.close()
+    return path
+
+
+@pytest.fixture
+def path(whole, tmp_path):
+    return shutil.copy(whole, tmp_path / "state.sqlite")
+
+
+@pytest.fixture
+def store(path):
+    opened = Store.open(path)
+    yield opened
+    opened.close()
+
+
+def clear(store: Store, cut: float = CUT) -> int:
+    return sum(store.remove(cut))
+
+
+def content(store: Store) -> dict[str, list]:
+    return {name: sorted(map(tuple, store._db.execute(f"SELECT * FROM {name}"))) for name in TABLES}
+
+
+def tail(store: Store, since: float) -> list:
+    return [a for a in store.assessments("unit") if a.t_dive >= since]
+
+
+def test_what_comes_after_is_as_if_nothing_had_been_removed(store, tmp_path):
+    more = [*LEGS, *(replace(HEALTHY, heading=1.0 + k) for k in range(4))]
+    assert clear(store) > 60
+    feed(mission(more)[len(LEGS) :], PARAMS, ALL, store)
+    full = feed(mission(more), PARAMS, ALL)
+    assert ending(store, "unit").state == ending(full, "unit").state
+    assert tail(store, CUT) == tail(full, CUT) != []
+    assert len(store.assessments("unit")) < len(full.assessments("unit")) / 2
+
+
+def test_a_late_file_finds_the_state_before_it(tmp_path):
+    made, late = mission(LEGS), 71
+    store = feed([s for k, s in enumerate(made) if k != late], PARAMS, ALL)
+    assert clear(store) > 0
+    feed([made[late]], PARAMS, ALL, store)
+    full = feed(made, PARAMS, ALL)
+    assert ending(store, "unit").state == ending(full, "unit").state
+    assert tail(store, CUT) == tail(full, CUT)
+
+
+def test_a_file_that_is_too_late_is_known_as_such(store):
+    made = mission(LEGS)
+    assert not any(store.is_past(s.id) for s in made)
+    assert not store.is_past(SegmentId(0.0, "unit", "earlier than all"))
+    clear(store)
+    held = [row[0] for row in store._db.execute("SELECT name FROM segments ORDER BY opened_at")]
+    past = [s.id.name for s in made if store.is_past(s.id)]
+    assert past == [s.id.name for s in made[: -len(held) + 1]]  # the first that is held is as it will be
+    assert store.is_past(SegmentId(2e9, "unit", held[0]))
+    assert not store.is_past(SegmentId(0.0, "another", "name"))
+
+
+def test_the_first_checkpoint_is_not_thinned_out(store):
+    clear(store)
+    first = store._db.execute("SELECT name FROM segments ORDER BY opened_at LIMIT 1").fetchone()[0]
+    more = [*LEGS, *(replace(HEALTHY, heading=1.0 + k) for k in range(RECENT))]
+    feed(mission(more)[len(LEGS) :], PARAMS, ALL, store)
+    sql = "SELECT checkpoint IS NOT NULL FROM segments WHERE name = ?"
+    assert store._db.execute(sql, (first,)).fetchone()[0] == 1
+
+
+def test_an_incident_that_is_over_goes_with_what_was_said_of_it(store):
+    told = len(store.alerts())
+    assert told == 2  # the alarm and the all-clear
+    clear(store)
+    assert store.incidents("unit") == [] and store.said("unit").threads == () and store.alerts() == []
+    assert intake.speak(store, "unit", PARAMS, ALL, 0.0) == ()
+    assert store._db.execute("SELECT count(*) FROM outbox").fetchone()[0] == 0
+
+
+def test_an_open_incident_keeps_all_that_is_since():
+    legs = [HEALTHY if k < 20 else SICK for k in range(RECENT + 26)]
+    store = feed(mission(legs), PARAMS, ALL)
+    store._db.execute("UPDATE outbox SET delivered_at = 1.0")
+    before, (incident,) = content(store), store.incidents("unit")
+    assert incident.cleared_at is None and incident.since < CUT
+    clear(store)
+    after = content(store)
+    kept = ("incidents", "said", "alerts", "outbox")
+    assert {name: after[name] for name in kept} == {name: before[name] for name in kept}
+    assert tail(store, incident.since) == [a for a in store.assessments("unit") if a.t_dive >= incident.since]
+    assert len(tail(store, incident.since)) >= len(legs) - 21
+    assert min(row[1] for row in after["segments"]) < incident.since
+    assert intake.speak(store, "unit", PARAMS, ALL, 0.0) == ()
+
+
+def test_an_end_that_was_not_told_keeps_its_incident(store):
+    said = store.said("unit")
+    (thread,) = said.threads
+    open_ = replace(thread, told=replace(thread.told, cleared_at=None))
+    with store.transaction():
+        store.say("unit", replace(said, threads=(open_,)), (), lambda alert: (), 0.0)
+    clear(store)
+    assert len(store.incidents("unit")) == 1
+    assert [a.kind for a in intake.speak(store, "unit", PARAMS, ALL, 0.0)] == ["all_clear"]
+
+
+def test_what_came_lately_is_kept_whatever_its_clock_says(store):
+    """A glider whose clock stands in 1970, and an archive that was taken in yesterday."""
+    store._db.execute("UPDATE heard SET at = ?", (CUT + 1,))
+    before = content(store)
+    assert clear(store) == 0 and content(store) == before
+
+
+def test_messages_that_wait_and_those_to_the_operator_stay(store, path):
+    with store.transaction():
+        store.post(alert("unit/0", glider="unit", incident=""), ["mail"], 0.0)
+        store.post(alert("operator/disk/1", glider="", incident=""), ["mail"], 0.0)
+    outbox = Outbox(path)
+    outbox.delivered(next(row.id for row in outbox.due(1.0) if row.alert.glider == ""), 2.0)
+    outbox.close()
+    clear(store)
+    assert [a.id for a in store.alerts()] == ["unit/0", "operator/disk/1"]
+    assert [u.alert for u in store.undelivered()] == ["unit/0"]
+
+
+def test_files_that_are_there_or_whose_folder_is_away_stay_known(store, tmp_path):
+    folder = tmp_path / "from-glider"
+    folder.mkdir()
+    (folder / "there.sbd").touch()
+    paths = [folder / "there.sbd", folder / "gone.sbd", tmp_path / "away" / "unknown.sbd"]
+    with store.transaction():
+        store._db.execute("DELETE FROM files")
+        for p in paths:
+            store.note(File(str(p), 1, 1, Status.TAKEN, "unit", p.stem), CUT - 1)
+        store.note(File(str(folder / "new.sbd"), 1, 1, Status.TAKEN, "unit", "new"), CUT + 1)
+        store.note(File(str(folder / "wait.sbd"), 1, 1, Status.WAITING, "unit", "wait"), CUT - 1)
+    clear(store)
+    left = {p.path.rpartition("/")[2] for p in store.files(*Status)}
+    assert left == {"there.sbd", "unknown.sbd", "new.sbd", "wait.sbd"}
+
+
+def test_an_interruption_anywhere_leaves_a_good_store(whole, store, tmp_path):
+    """After each step, and inside of each: it is whole, a file that comes then leads to the same, and the
+    next run ends as one that was not interrupted."""
+    clear(store)
+    aim, made = content(store), mission([*LEGS, HEALTHY])
+    after = ending(feed(made[-1:], PARAMS, ALL, store), "unit").state
+    steps = 0
+    while True:
+        path = shutil.copy(whole, tmp_path / f"{steps}.sqlite")
+        interrupted = Store.open(path)
+        done = stopped_in(interrupted, steps)
+        interrupted.close()
+        assert damage(path) is None
+        again = Store.open(path)
+        if steps % 5 == 0:  # a file that comes before the next run
+            copy = Store.open(shutil.copy(path, tmp_path / "copy.sqlite"))
+            assert ending(feed(made[-1:], PARAMS, ALL, copy), "unit").state == after
+            copy.close()
+        clear(again)
+        assert content(again) == aim
+        again.close()
+        path.unlink()
+        if done:
+            break
+        steps += 1
+    assert steps > 5
+
+
+def stopped_in(store: Store, n: int) -> bool:
+    """Remove up to an error at the end of transaction `n`, before its commit; whether there was none."""
+    count = 0
+
+    @contextmanager
+    def transaction():
+        nonlocal count
+        with store.transaction():
+            yield
+            count += 1
+            if count > n:
+                raise KeyboardInterrupt
+
+    try:
+        for _ in retention.remove(store._db, transaction, store.gliders(), CUT):
+            pass
+    except KeyboardInterrupt:
+        return False
+    return True
+
+
+def test_the_room_is_given_back(store, path):
+    store._db.execute("CREATE TABLE filling (data BLOB)")
+    store._db.execute("INSERT INTO filling VALUES (zeroblob(20000000))")
+    store._db.execute("DROP TABLE filling")
+    before = content(store)
+    for row in range(2):  # the first time it is written anew, from then on page by page
+        assert store._db.execute("PRAGMA freelist_count").fetchone()[0] > 3000
+        list(retention.remove(store._db, store.transaction, (), 0.0))
+        assert store._db.execute("PRAGMA freelist_count").fetchone()[0] == 0
+        assert store._db.execute("PRAGMA page_count").fetchone()[0] < 2000
+        if row == 0:
+            store._db.execute("CREATE TABLE filling (data BLOB)")
+            store._db.execute("INSERT INTO filling VALUES (zeroblob(20000000))")
+            store._db.execute("DROP TABLE filling")
+    assert content(store) == before
+    with sqlite3.connect(path) as db:
+        assert db.execute("PRAGMA integrity_check").fetchone()[0] == "ok"
+
+
+class TestDaily:
+    def begun(self, steps: list[list[int]], cuts: list[float]) -> Retention:
+        def begin(cut: float):
+            cuts.append(cut)
+            yield from steps.pop(0)
+
+        return Retention(begin, 1e9, 0.0)
+
+    def test_an_hour_after_the_start_then_daily_step_by_step(self):
+        cuts: list[float] = []
+        made = self.begun([[1, 2], []], cuts)
+        assert made.pause(0.0) == HOUR
+        made.turn(100.0, 1e9 + 10, 10.0)
+        assert cuts == []
+        for _ in range(3):
+            assert made.pause(HOUR) == 0.0
+            made.turn(100.0, 1e9 + HOUR, HOUR)
+        assert cuts == [1e9 + HOUR - 100 * DAY] and made.pause(HOUR) == DAY
+        made.turn(100.0, 1e9 + HOUR + DAY, HOUR + DAY)
+        assert len(cuts) == 2
+
+    def test_nothing_is_removed_where_all_is_kept(self):
+        cuts: list[float] = []
+        self.begun([], cuts).turn(None, 1e9 + HOUR, HOUR)
+        assert cuts == []
+
+    def test_a_clock_that_has_jumped_removes_nothing(self):
+        """Else years would be gone by a machine that wakes up in 2040."""
+        cuts: list[float] = []
+        made = self.begun([[]], cuts)
+        made.turn(100.0, 2e9, HOUR)
+        assert cuts == [] and made.pause(HOUR) == DAY
+        made.turn(100.0, 2e9 + DAY, HOUR + DAY)
+        assert len(cuts) == 1
+
+    def test_after_an_error_it_begins_anew(self):
+        def broken(cut: float):
+            yield 1
+            raise OSError
+
+        made = Retention(broken, 1e9, 0.0)
+        made.turn(100.0, 1e9 + HOUR, HOUR)
+        with pytest.raises(OSError):
+            made.turn(100.0, 1e9 + HOUR, HOUR)
+        assert made.pause(HOUR) == HOUR
+
+
+def test_said_of_a_glider_without_incidents_is_left_alone(store):
+    said = Said(surfaced=5.0)
+    with store.transaction():
+        store.say("unit", replace(store.said("unit"), surfaced=5.0), (), lambda alert: (), 0.0)
+    clear(store)
+    assert store.said("unit") == said
+
+
+def test_the_daemon_notes_a_file_that_is_too_late(tmp_path):
+    """Its own state before it is gone: taken, it would begin the glider anew."""
+    site = angus(tmp_path)
+    with Daemon(site) as daemon:
+        put(site, *FILES)
+        taken(site, *FILES)
+        daemon.stop()
+    store = Store.open(site.state)
+    store._db.execute("UPDATE heard SET at = 0")
+    assert sum(store.remove(2e9)) > 0
+    before = store.assessments("angus")
+    store.close()
+    with Daemon(site):
+        site.put("angus", "again.sbd", FILES[0].data)
+        until(lambda: site.statuses("again.sbd") == [Status.DUPLICATE], "noted")
+    assert "older than what state.keep_days keeps" in site.files()["again.sbd"].reason
+    store = Store.reading(site.state)
+    assert store.assessments("angus") == before
+    store.close()

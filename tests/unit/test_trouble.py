@@ -1,0 +1,63 @@
+"""What the daemon does while its state cannot be used."""
+
+from __future__ import annotations
+
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from gliderwatch.errors import DamagedError, StateError
+from gliderwatch.run import trouble
+from gliderwatch.run.trouble import Trouble
+from gliderwatch.store.sqlite import Store
+
+
+@pytest.fixture
+def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Store:
+    monkeypatch.setattr(trouble, "PAUSE", 0.0)
+    return Store.open(tmp_path / "state.sqlite")
+
+
+def test_no_turn_is_done_until_the_state_can_be_written_again(store: Store) -> None:
+    """A turn may find nothing to write, and must not give a sign of life then."""
+    turns: list[int] = []
+
+    def turn() -> None:
+        turns.append(1)
+        if len(turns) == 1:
+            store.probe()
+
+    watch = Trouble(store, lambda: False)
+    store._db.execute("PRAGMA query_only = 1")
+    assert [watch.spared(turn) for _ in range(3)] == [False] * 3 and len(turns) == 1
+    store._db.execute("PRAGMA query_only = 0")
+    assert watch.spared(turn) and len(turns) == 2
+
+
+def test_what_sqlite_says_outside_a_transaction_is_trouble_too(store: Store) -> None:
+    store.close()
+    path = Path(store._path)
+    path.write_bytes(b"")
+    bare = Store(sqlite3.connect(path), path)
+    assert not Trouble(bare, lambda: False).spared(lambda: print(bare.counts()))
+
+
+def test_damage_and_mistakes_are_not_waited_for(store: Store) -> None:
+    watch = Trouble(store, lambda: False)
+    for error in (DamagedError("bad"), ZeroDivisionError()):
+
+        def turn(error: Exception = error) -> None:
+            raise error
+
+        with pytest.raises(type(error)):
+            watch.spared(turn)
+
+
+def test_it_ends_at_once_when_it_is_told_to(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(trouble, "PAUSE", 1e6)
+
+    def turn() -> None:
+        raise StateError("full")
+
+    assert not Trouble(store, lambda: True).spared(turn)
