@@ -18,9 +18,10 @@ from gliderwatch.params import Attention
 from gliderwatch.rules.acknowledged import acknowledge
 from gliderwatch.rules.announce import as_told, due
 from gliderwatch.run import intake
-from gliderwatch.run.manage import backup, mute
+from gliderwatch.run.manage import mute
 from gliderwatch.run.manage.incidents import ack, incidents
 from gliderwatch.run.speaking import NOBODY
+from gliderwatch.store import backup
 from gliderwatch.store.database import MEMORY
 from gliderwatch.store.sqlite import Store
 
@@ -254,7 +255,7 @@ class TestBackup:
         writer = Store.open(tmp_path / "state.sqlite")
         with writer.transaction():  # what is not committed is not in the copy, and holds nobody up
             writer.notes.mute("electa", 9.0, 0.0)
-            assert backup.backup(config, target) == target.stat().st_size
+            assert backup.backup(Path(config.state.path), target) == target.stat().st_size
         writer.close()
         assert [p.name for p in target.parent.iterdir()] == ["copy.sqlite"]
         copy = Store.reading(target)
@@ -273,7 +274,7 @@ class TestBackup:
         else:
             target.symlink_to(tmp_path / "nowhere")
         with pytest.raises(GliderwatchError, match="is there already"):
-            backup.backup(config, target)
+            backup.backup(Path(config.state.path), target)
         assert kind != "file" or target.read_text(encoding="utf-8") == "precious"
         assert not (tmp_path / "nowhere").exists()
 
@@ -283,7 +284,7 @@ class TestBackup:
         target = tmp_path / "copy"
         monkeypatch.setattr(backup, "_sync", lambda path: target.write_text("precious", encoding="utf-8"))
         with pytest.raises(GliderwatchError, match="is there now"):
-            backup.backup(config, target)
+            backup.backup(Path(config.state.path), target)
         assert target.read_text(encoding="utf-8") == "precious"
         assert not (tmp_path / "copy.part").exists()
 
@@ -297,12 +298,12 @@ class TestBackup:
         data[(root - 1) * size : root * size] = os.urandom(size)
         state.write_bytes(data)
         with pytest.raises(StateError, match=r"not whole.*set.* aside"):
-            backup.backup(config, tmp_path / "copy")
+            backup.backup(Path(config.state.path), tmp_path / "copy")
         assert not list(tmp_path.glob("copy*"))
 
     def test_into_a_folder_that_is_not_there_is_refused(self, config: Config, tmp_path: Path) -> None:
         with pytest.raises(GliderwatchError, match=r"No such file or directory\. Name another place"):
-            backup.backup(config, tmp_path / "nowhere" / "copy")
+            backup.backup(Path(config.state.path), tmp_path / "nowhere" / "copy")
 
 
 def test_a_state_of_an_earlier_release_is_read_but_not_written(config: Config, tmp_path: Path) -> None:

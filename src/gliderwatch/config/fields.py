@@ -49,6 +49,11 @@ def _moment(value: object) -> object:
     return (moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)).timestamp()
 
 
+def moment(text: str) -> float:
+    """A moment as a command is given one (s), written as in the configuration. Raises ValueError."""
+    return float(str(_moment(text)))
+
+
 def _url(value: object) -> object:
     if isinstance(value, dict):
         if set(value) != {"file"} or not isinstance(value["file"], str):

@@ -112,6 +112,7 @@ def _forget_incidents(db: sqlite3.Connection, glider: str, cut: float) -> tuple[
     floor = _floor(incidents, said.threads, cut)
     gone = [(i.id,) for i in incidents if i.cleared_at is not None and i.cleared_at < floor]
     db.executemany("DELETE FROM incidents WHERE id = ?", gone)
+    db.executemany("DELETE FROM acks WHERE incident = ?", gone)
     threads = tuple(t for t in said.threads if _ended(t) >= floor)
     if threads != said.threads:
         text = codec.plain_encode(replace(said, threads=threads))

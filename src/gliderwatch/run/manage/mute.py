@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 
-import pydantic
-
 from gliderwatch.alerts.words import utc
 from gliderwatch.config import Config
-from gliderwatch.config.fields import Moment
+from gliderwatch.config.fields import moment
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.run.manage.opening import known_glider, writing
 
 _YEAR = 366 * 86400.0
-_MOMENT: pydantic.TypeAdapter[float] = pydantic.TypeAdapter(Moment)
 
 
 def until(date: str | None, hours: float | None, now: float) -> float:
@@ -24,11 +21,9 @@ def until(date: str | None, hours: float | None, now: float) -> float:
         )
     if date is not None:
         try:
-            end = _MOMENT.validate_python(date)
-        except pydantic.ValidationError as error:
-            raise GliderwatchError(
-                f"--until {error.errors()[0]['msg'].removeprefix('Value error, ')}"
-            ) from None
+            end = moment(date)
+        except ValueError as error:
+            raise GliderwatchError(f"--until {error}") from None
     else:
         end = now + (hours or 0.0) * 3600
     if not math.isfinite(end) or end <= now:

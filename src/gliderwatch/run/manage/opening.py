@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -33,7 +32,7 @@ def writing(config: Config) -> Iterator[Store]:
     """
     path = Path(config.state.path)
     with closing(read_only(path)) as db:
-        version = _version(db)
+        version = int(db.execute("PRAGMA user_version").fetchone()[0])
     if version < SCHEMA:
         raise StateError(
             f"state file {path} is of an earlier release (schema {version}, now {SCHEMA}). "
@@ -55,7 +54,3 @@ def known_glider(config: Config, name: str) -> str:
             f"{', '.join(sorted(config.gliders)) or 'none'}"
         )
     return found
-
-
-def _version(db: sqlite3.Connection) -> int:
-    return int(db.execute("PRAGMA user_version").fetchone()[0])

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
-from gliderwatch.config import Config
 from gliderwatch.errors import GliderwatchError, StateError
 from gliderwatch.store.database import guarded, read_only
 
@@ -16,14 +15,13 @@ PART = ".part"
 """Ends the name of a copy until it is proved to be whole."""
 
 
-def backup(config: Config, target: Path) -> int:
-    """Copy the state file of a configuration to `target`; its size (bytes).
+def backup(source: Path, target: Path) -> int:
+    """Copy the state file `source` to `target`; its size (bytes).
 
     https://sqlite.org/backup.html: all in one step, so that a writer neither waits nor makes it begin anew.
     Raises GliderwatchError where there is something at `target` already, where it cannot be written, or where
     the copy is not whole; then nothing is left there.
     """
-    source = Path(config.state.path)
     part = target.with_name(target.name + PART)
     with closing(read_only(source)) as db, _reserved(target, part):
         with closing(_open(part)) as copy:
