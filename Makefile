@@ -15,7 +15,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 WHEELHOUSE := dist/wheelhouse
 
 .DEFAULT_GOAL := help
-.PHONY: help install test demo lint format types contracts audit sbom docs wheelhouse lock clean
+.PHONY: help install test demo lint format types contracts docs audit sbom wheelhouse lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))

@@ -22,16 +22,19 @@ _LONGEST = 1000
 
 
 class _Patient(io.TextIOBase):
-    """Standard error, but a line that cannot be written is left out: a full disk must not end the watch."""
+    """A stream, but a line that cannot be written is left out: a full disk must not end the watch."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
 
     def write(self, text: str) -> int:
         with suppress(OSError):
-            sys.stderr.write(text)
+            self._stream.write(text)
         return len(text)
 
     def flush(self) -> None:
         with suppress(OSError):
-            sys.stderr.flush()
+            self._stream.flush()
 
 
 def configure() -> None:
@@ -53,7 +56,7 @@ def configure() -> None:
             *renderer,
         ],
         wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
-        logger_factory=structlog.WriteLoggerFactory(file=cast(TextIO, _Patient())),
+        logger_factory=structlog.WriteLoggerFactory(file=cast(TextIO, _Patient(sys.stderr))),
         cache_logger_on_first_use=True,
     )
 
