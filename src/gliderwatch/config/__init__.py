@@ -10,7 +10,8 @@ from gliderwatch.config.loading import load
 from gliderwatch.config.paths import expand
 from gliderwatch.config.problem import Problem
 from gliderwatch.config.root import Config
-from gliderwatch.config.sections import Channel, Dockserver, Glider, Recipient, State
+from gliderwatch.config.sections import Glider
+from gliderwatch.config.service import Channel, Dockserver, Recipient, State
 
 __all__ = [
     "Channel",

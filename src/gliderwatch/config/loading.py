@@ -12,7 +12,8 @@ from pydantic import TypeAdapter, ValidationError
 from gliderwatch.config.document import Document, read
 from gliderwatch.config.problem import Problem, nearest, shown
 from gliderwatch.config.root import Config
-from gliderwatch.config.sections import Preset, Section
+from gliderwatch.config.section import Section
+from gliderwatch.config.sections import Preset
 from gliderwatch.errors import ConfigError
 
 _PRESETS = dict[str, Preset]

@@ -11,18 +11,16 @@ from pydantic import Field, PrivateAttr, SecretStr
 from gliderwatch.config import references
 from gliderwatch.config.document import Document
 from gliderwatch.config.fields import GliderName, Name
-from gliderwatch.config.sections import (
+from gliderwatch.config.section import Section
+from gliderwatch.config.sections import Glider, Preset, Settings
+from gliderwatch.config.service import (
     Channel,
     Dockserver,
-    Glider,
     Heartbeat,
     Metrics,
     Ocean,
     Operator,
-    Preset,
     Recipient,
-    Section,
-    Settings,
     State,
 )
 from gliderwatch.errors import ConfigError

@@ -17,7 +17,7 @@ from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info
 
 from gliderwatch import __version__
 from gliderwatch.config import Config
-from gliderwatch.config.sections import Metrics as Settings
+from gliderwatch.config.service import Metrics as Settings
 from gliderwatch.model import Assessment
 from gliderwatch.rules.overdue import RECENT
 from gliderwatch.rules.silence import GONE, awaited

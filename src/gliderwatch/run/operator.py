@@ -15,7 +15,7 @@ from typing import Any
 from gliderwatch.alerts import message
 from gliderwatch.alerts.words import duration, utc
 from gliderwatch.config import Config
-from gliderwatch.config.sections import Operator as Settings
+from gliderwatch.config.service import Operator as Settings
 from gliderwatch.model import Alert, Severity
 from gliderwatch.store.database import guarded, read_only
 from gliderwatch.store.sqlite import Store
