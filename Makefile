@@ -4,8 +4,8 @@ PYTHON ?= python3
 # Wheels only, so that nothing is compiled behind your back. dbdreader has none for CPython 3.14
 # and for ARM: there, `make test WHEELS=` builds that one from source.
 WHEELS ?= --only-binary :all:
-# pytest processes: many tests wait more than they work. Those marked `timing` always run alone.
-JOBS ?= 3
+# pytest processes; tests marked `timing` always run alone.
+JOBS ?= 2
 UV_VERSION := 0.13.9
 CYCLONEDX_VERSION := 7.5.0
 
