@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gliderwatch.estimation.causes import FASTEST
+from gliderwatch.estimation.reckoned import MAD_TO_SIGMA
 from gliderwatch.model import Array, readonly
 
 LIKE = 0.1
 """Settings of a thruster (0 to 1) that differ by less are alike."""
-MAD_TO_SIGMA = 1.4826
-"""Standard deviation of normal numbers by their median absolute deviation."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ SHORTEST = 1.0
 FLATTEST = 0.15
 """rad: below this pitch its tangent says too little."""
 MAD_TO_SIGMA = 1.4826
+"""Standard deviation of normal numbers by their median absolute deviation."""
 
 
 @dataclass(frozen=True, slots=True)
