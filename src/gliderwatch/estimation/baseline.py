@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gliderwatch.estimation.range import LIKE, MAD_TO_SIGMA
+from gliderwatch.estimation.range import LIKE
+from gliderwatch.estimation.reckoned import MAD_TO_SIGMA
 from gliderwatch.model import Array, readonly
 
 FIRST, RECENT = 12, 12
