@@ -31,6 +31,8 @@ CHI2 = 5.991
 """95 % of squared distances in a plane, in standard errors, are below this."""
 NEAR = 200.0
 """Metres: waypoints nearer than this are the same one, told with other decimals."""
+FAR = 0.01
+"""Degrees of latitude that are more than that for sure."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +71,7 @@ def is_same(a: Place, b: Place) -> bool:
     >>> is_same((38.3892, -73.5), (38.389, -73.5)), is_same((38.38, -73.5), (38.389, -73.5))
     (True, False)
     """
-    return float(np.hypot(*to_plane(*a, *b))) < NEAR
+    return abs(a[0] - b[0]) < FAR and (a == b or float(np.hypot(*to_plane(*a, *b))) < NEAR)
 
 
 def goals(state: Surfacings) -> tuple[Array, ...]:

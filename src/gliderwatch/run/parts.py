@@ -66,9 +66,10 @@ class Parts:
         self.watcher.start()
 
     def stop(self, after: Parts | None = None) -> None:
-        """End all work; a dispatcher that the parts after go on with is left to them."""
+        """End all work; the decoder, and a dispatcher that the parts after go on with, are left to them."""
         self.watcher.stop()
-        self.decoder.close()
+        if after is None:
+            self.decoder.close()
         if after is None or after.dispatcher is not self.dispatcher:
             self.dispatcher.stop()
 
@@ -88,7 +89,8 @@ def build(
     """The parts of a configuration, not started. Raises ConfigError where a secret is missing.
 
     With the channels of the parts before their dispatcher goes on: a message that is on its way when the
-    configuration is read again is then not sent a second time.
+    configuration is read again is then not sent a second time. Their decoder goes on always, with its worker
+    processes.
     """
     urls = {name: config.channel_url(name).get_secret_value() for name in config.channels}
     if before is not None and before.urls == urls:
@@ -104,6 +106,11 @@ def build(
         news,
         config.dockserver.observer,
     )
+    if before is None:
+        decoder = Decoder(watcher.cache_folders(), max_workers=workers)
+    else:
+        decoder = before.decoder
+        decoder.cache_folders = watcher.cache_folders()
     return Parts(
         config,
         news,
@@ -111,7 +118,7 @@ def build(
         speaking(config),
         Settling(config.dockserver.settle_seconds),
         watcher,
-        Decoder(watcher.cache_folders(), max_workers=workers),
+        decoder,
         Backlog(),
         dispatcher,
         Ocean(config),
