@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import sqlite3
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from alert_support import DISAGREE, SLOW, incident
+from alert_support import DISAGREE, SLOW, alert, incident
 from announcing import Talk, World
 from gliderwatch.config import Config, load
 from gliderwatch.errors import GliderwatchError, StateError
@@ -20,7 +21,9 @@ from gliderwatch.rules.announce import as_told, due
 from gliderwatch.run import intake
 from gliderwatch.run.manage import mute
 from gliderwatch.run.manage.incidents import ack, incidents
+from gliderwatch.run.operator import failing
 from gliderwatch.run.speaking import NOBODY
+from gliderwatch.run.status import overview
 from gliderwatch.store import backup
 from gliderwatch.store.database import MEMORY
 from gliderwatch.store.sqlite import Store
@@ -307,10 +310,18 @@ class TestBackup:
 
 
 def test_a_state_of_an_earlier_release_is_read_but_not_written(config: Config, tmp_path: Path) -> None:
-    with sqlite3.connect(tmp_path / "state.sqlite") as db:
-        db.executescript("DROP TABLE mutes; DROP TABLE acks; PRAGMA user_version = 2;")
+    path = tmp_path / "state.sqlite"
+    with closing(Store.open(path)) as store:
+        store.post(alert(), ["mail"], NOW)
+    with sqlite3.connect(path) as db:
+        db.executescript(
+            "DROP TABLE mutes; DROP TABLE acks; DROP INDEX outbox_by_delivery; PRAGMA user_version = 2;"
+            "ALTER TABLE outbox DROP COLUMN held_until; ALTER TABLE outbox DROP COLUMN escalates;"
+        )
+    assert [u.held_until for u in overview(config).undelivered] == [0.0]
+    assert failing(path, NOW) == {}
     assert [n.ack for n in incidents(config)] == [None]
     with pytest.raises(StateError, match="systemctl restart gliderwatch"):
         mute.mute(config, "electa", NOW + 60, NOW)
-    Store.open(tmp_path / "state.sqlite").close()
+    Store.open(path).close()
     assert mute.mute(config, "electa", NOW + 60, NOW) == ["electa: muted until 2023-11-14 22:14 UTC"]

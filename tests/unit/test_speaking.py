@@ -29,7 +29,7 @@ def config(folder: Path, **recipients: dict[str, Any]) -> Config:
 
 def told(settings: Config, **changes: Any) -> list[str]:
     base = replace(alert(), glider="electa", kind=Kind.ANOMALY, audience=Severity.CRITICAL)
-    return channels(replace(base, **changes), settings)
+    return list(channels(replace(base, **changes), settings))
 
 
 def test_each_channel_is_named_once_in_the_order_of_the_recipients(tmp_path: Path) -> None:
