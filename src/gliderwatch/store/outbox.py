@@ -72,8 +72,9 @@ def post(
         )
         db.execute(
             "UPDATE outbox SET held_until = min(held_until, ?), escalates = min(escalates, ?) "
-            "WHERE delivered_at IS NULL AND channel = ? AND incident = ? AND incident != ''",
-            (due.at, due.escalates, channel, alert.incident),
+            "WHERE delivered_at IS NULL AND channel = ? AND incident = ? AND incident != '' "
+            "AND min(held_until, escalates) > ?",
+            (due.at, due.escalates, channel, alert.incident, now),
         )
 
 
