@@ -15,7 +15,7 @@ from alert_support import alert
 from gliderwatch.config import Config, load
 from gliderwatch.model import Kind, Severity
 from gliderwatch.rules.waiting import QuietHours, Wait
-from gliderwatch.run import operator
+from gliderwatch.run import operator, replay
 from gliderwatch.run.speaking import NOBODY, channels, speaking
 
 
@@ -115,6 +115,11 @@ def test_each_channel_tells_what_those_who_share_it_wait_for(tmp_path: Path) -> 
         "sms": [Wait()],
         "slack": [Wait()],
     }
+
+
+def test_a_replay_that_sends_waits_for_nothing(tmp_path: Path) -> None:
+    settings = config(tmp_path, chief={"channels": ["slack"], "unacknowledged_minutes": 30})
+    assert replay._at_once(settings).channels(alert()) == ["slack"]
 
 
 def test_nobody_is_nobody() -> None:
