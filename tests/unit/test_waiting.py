@@ -9,8 +9,9 @@ from zoneinfo import ZoneInfo
 
 import pytest
 
-from alert_support import alert
+from alert_support import SLOW, alert, incident
 from announcing import World
+from gliderwatch.alerts import message
 from gliderwatch.alerts.escalation import escalated
 from gliderwatch.model import Incident, Severity
 from gliderwatch.rules.acknowledged import acknowledge
@@ -136,6 +137,13 @@ def test_an_escalated_message_says_why_it_comes_and_what_to_do() -> None:
     assert told.body == f"{lead}\n\n{made.body}"
     assert told.html == f"<body>\n<p><b>{lead}</b></p>\n<p style='x'>a</p>\n<p style='y'>b</p>"
     assert (told.id, told.incident) == (made.id, made.incident)
+
+
+def test_a_mail_says_it_above_all_else() -> None:
+    made = message.opened(incident(), SLOW, alert_id="a", audience=Severity.CRITICAL)
+    told = escalated(replace(made, incident="electa/anomaly/1"), 60.0)
+    place = told.html.index("Nobody has acknowledged this for 1 min")
+    assert told.html.index("<body") < place < told.html.index("<b>ANOMALY electa")
 
 
 def test_a_silence_is_taken_on_by_a_mute() -> None:
