@@ -103,6 +103,9 @@ def status(view: Overview, console: Console) -> None:
         console.print(
             Text(f"gliders not in the configuration: {names} ({len(view.unknown)} files left alone)")
         )
+    for u in view.held:
+        until = f"{utc(u.held_until)}{', unless acknowledged' if u.escalates else ' (quiet hours)'}"
+        console.print(Text(f"held until {until}: {clean(u.alert)} by {u.channel}"), soft_wrap=True)
     for u in view.undelivered:
         why = f": {clean(u.error)}" if u.error else ""
         console.print(Text(f"undelivered: {clean(u.alert)} by {u.channel}, {u.attempts} attempts{why}"))

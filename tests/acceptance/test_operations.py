@@ -206,7 +206,7 @@ def test_the_others_tell_that_a_channel_fails_and_that_it_works_again(site: Site
             assert "451 come back later" in good.mails[0].text
             bad.refusing = False
             until(lambda: len(good.mails) == 2, "the operator is told that it is over")
-            assert good.mails[1].subject == "GLIDERWATCH: channel bad delivers again"
+            assert good.mails[1].subject == "GLIDERWATCH: channel bad does not fail any more"
             assert daemon.stop() == 0
         with quick(site) as daemon:
             until(lambda: len(daemon.log("watching")) == 2, "a second life")

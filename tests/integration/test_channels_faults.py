@@ -287,4 +287,4 @@ def test_a_channel_that_is_dead_for_an_hour_is_reported_over_the_others(state: P
         assert {u.channel for u in store.undelivered() if u.alert == report.id} == {"web"}
         outbox.delivered(1, now + 1.2 * HOUR)
         (over,) = watch.look(config, limits, now + 1.3 * HOUR, 0.0)
-        assert "delivers again" in over.title
+        assert "does not fail any more" in over.title

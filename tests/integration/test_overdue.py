@@ -12,6 +12,7 @@ from gliderwatch.ingest.decode import decode
 from gliderwatch.ingest.header import read_header
 from gliderwatch.model import Alert, Kind, Segment, SegmentId, Severity
 from gliderwatch.params import Attention, GliderParams
+from gliderwatch.rules.waiting import Wait
 from gliderwatch.run import intake
 from gliderwatch.run.intake import Speaking
 from gliderwatch.run.replay import Request, replay
@@ -254,6 +255,41 @@ class TestSignsOfLife:
         )
         assert live.take(after[0]) == ["all_clear"]
         assert live.take(late, after[0].last_t) == ["correction"]
+
+
+class TestEscalation:
+    """Who is second hears of a silence that nobody cares for in half an hour."""
+
+    @pytest.fixture
+    def overdue(self, fleet) -> tuple[Live, list[Segment], float]:
+        live, after, due = silent(fleet)
+        live.speaking = replace(
+            live.speaking, channels=lambda a: {"mail": [Wait()], "sms": [Wait(after=HOUR / 2)]}
+        )
+        assert live.tick(due) == ["overdue"]
+        return live, after, due
+
+    def waiting(self, live: Live) -> dict[str, float]:
+        return {u.alert: u.held_until for u in live.store.undelivered() if u.channel == "sms"}
+
+    def test_it_waits_and_is_withdrawn_when_the_glider_calls(self, overdue) -> None:
+        live, after, due = overdue
+        assert self.waiting(live) == {live.alerts[-1].id: due + HOUR / 2}
+        assert live.take(after[0], due + HOUR / 4) == ["all_clear"]
+        assert self.waiting(live) == {}
+        assert [u.alert for u in live.store.undelivered()] == [a.id for a in live.alerts[-2:]], "by mail"
+
+    def test_who_was_told_of_it_is_told_of_its_end(self, overdue) -> None:
+        live, after, due = overdue
+        assert live.take(after[0], due + HOUR) == ["all_clear"]
+        assert self.waiting(live) == {live.alerts[-2].id: due + HOUR / 2, live.alerts[-1].id: 0.0}
+
+    @pytest.mark.parametrize("attention", [Attention(recovered=True), Attention(muted_until=2e9)])
+    def test_it_is_withdrawn_where_the_configuration_mutes_the_glider(self, overdue, attention) -> None:
+        live, _, due = overdue
+        live.speaking = replace(live.speaking, attention=lambda glider: attention)
+        intake.speak(live.store, "angus", GliderParams(), live.speaking, due + HOUR / 4)
+        assert self.waiting(live) == {}
 
 
 class TestQuiet:

@@ -100,11 +100,15 @@ class TestOpening:
                 codec.encode(s),
             )
             old.execute("INSERT INTO segments VALUES (?, ?, ?, ?, ?, x'00', 1)", row)
+        waits = alert(incident="")
+        old.execute("INSERT INTO alerts VALUES ('a1', 'unit', 0, 0, ?)", (codec.plain_encode(waits),))
+        old.execute("INSERT INTO outbox (alert, channel, incident) VALUES ('a1', 'mail', '')")
         old.commit()
         old.close()
         store = feed(made[-1:], store=Store.open(path))
         assert ending(store, "unit") == ending(feed(made), "unit")
         assert store.expected("unit", 1e12) == feed(made).expected("unit", 1e12)
+        assert [row.alert for row in Outbox(path).due(1e9)] == [waits], "held by nothing"
 
     def test_a_migration_that_fails_changes_nothing(self, store, path, monkeypatch):
         store.close()

@@ -209,3 +209,10 @@ def test_nobody_hears(found: Check) -> None:
     spare, electa = found(text)
     assert spare.startswith("warning c.yml:15: channels.spare: no recipient uses it")
     assert electa.startswith("warning c.yml:8: gliders.electa: no recipient gets its alerts")
+
+
+def test_nobody_hears_at_once(found: Check) -> None:
+    second = TEXT + "  chief: {channels: [hook], unacknowledged_minutes: 30}\n"
+    assert found(second) == []
+    alone = found(second.replace("  pilot: {channels: [hook]}\n", ""))
+    assert is_one(alone, "warning c.yml:15: recipients: nobody gets the alerts of these at once: electa, sam")

@@ -11,7 +11,18 @@ from gliderwatch.config import load
 from gliderwatch.errors import ConfigError
 
 MINIMAL = "dockserver: {roots: [/data]}\n"
+RECIPIENT = MINIMAL + "channels: {m: {url: 'json://h'}}\nrecipients:\n  a: {channels: [m]}\n"
 Write = Callable[[str], Path]
+
+
+def of_recipient(key: str) -> str:
+    """A file whose fifth line is a key of a recipient."""
+    return RECIPIENT.replace("a: {channels: [m]}", f"a:\n    {key}\n    channels: [m]")
+
+
+def night(hours: str) -> str:
+    """One whose fifth line is quiet hours."""
+    return of_recipient(f"quiet_hours: {{{hours}}}")
 
 
 @pytest.fixture
@@ -91,6 +102,38 @@ def problems(path: Path) -> list[str]:
         ),
         (MINIMAL + "gliders: {a: {muted_until: 20261201}}", "2: gliders.a.muted_until: must be a date"),
         (MINIMAL + "gliders: {a: {muted_until: 2026-W01}}", "2: gliders.a.muted_until: must be a date"),
+        (
+            MINIMAL + "ocean: {area: {soth: 3, north: 4, west: 5, east: 6}}",
+            "2: ocean.area.soth: unknown key (did you mean `south`?)",
+        ),
+        (night("start: '22:00', end: '7:00'"), "5: recipients.a.quiet_hours.end: must be a time of day"),
+        (night("start: 2200, end: '24:00'"), "5: recipients.a.quiet_hours.end: must be a time of day"),
+        (night("start: 22:00, end: 22:00"), "5: recipients.a.quiet_hours: start and end are the same"),
+        (night("start: 22:00"), "5: recipients.a.quiet_hours.end: is missing"),
+        (
+            night("start: 22:00, end: 07:00, below: info"),
+            "5: recipients.a.quiet_hours.below: must be warning or critical",
+        ),
+        (
+            night("start: 22:00, end: 07:00, time_zone: Europe/Amsterdm"),
+            "5: recipients.a.quiet_hours.time_zone: there is no such time zone (did you mean Europe/Ams",
+        ),
+        (
+            night("start: 22:00, end: 07:00, time_zone: ../../etc/passwd"),
+            "5: recipients.a.quiet_hours.time_zone: there is no such time zone (write UTC, or a name as",
+        ),
+        (
+            night("start: 22:00, end: 07:00, time_zone: Europe"),
+            "5: recipients.a.quiet_hours.time_zone: there is no such time zone",
+        ),
+        (
+            night("start: 22:00, end: 07:00, from: 1"),
+            "5: recipients.a.quiet_hours.from: unknown key (known are: below",
+        ),
+        (
+            of_recipient("unacknowledged_minutes: 0"),
+            "5: recipients.a.unacknowledged_minutes: must be greater than 0",
+        ),
         (MINIMAL + "gliders: {a: {recovered: 1}}", "2: gliders.a.recovered: must be true or false"),
         (MINIMAL + "gliders: {a: {recovered: }}", "2: gliders.a.recovered: must be true or false"),
         (MINIMAL + "defaults: {recovered: true}", "2: defaults.recovered: unknown key"),

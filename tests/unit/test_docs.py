@@ -143,7 +143,8 @@ def test_queries_fit_the_schema() -> None:
     ]
     assert len(statements) > 5
     db = sqlite3.connect(":memory:")
-    db.executescript(schema())
+    for script in (schema(), *MIGRATIONS.values()):
+        db.executescript(script)
     for statement in statements:
         db.execute(statement)
 

@@ -373,7 +373,14 @@ def test_messages_that_wait_for_a_channel(examined: Doctor, tree: Path) -> None:
         store.post(alert("a"), ["hook"], time.time() - 7200)
         assert examined() == [], "not tried yet"
         rows.failed(1, "451 come back later", 0.0)
-    assert one(examined(), Level.WARNING, "channels", "hook: 1 messages wait", "2.0 h", "451 come back later")
+    assert one(
+        examined(),
+        Level.WARNING,
+        "channels",
+        "hook: 1 messages not delivered",
+        "2.0 h",
+        "451 come back later",
+    )
 
 
 def test_a_test_message_goes_through_each_channel_only_when_asked(

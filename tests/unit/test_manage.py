@@ -4,23 +4,31 @@ from __future__ import annotations
 
 import os
 import sqlite3
+from contextlib import closing
 from dataclasses import replace
+from datetime import UTC, time
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
-from alert_support import DISAGREE, SLOW, incident
+from alert_support import DISAGREE, SLOW, alert, incident
 from announcing import Talk, World
+from gliderwatch import tables
 from gliderwatch.config import Config, load
 from gliderwatch.errors import GliderwatchError, StateError
 from gliderwatch.model import Kind, Severity
 from gliderwatch.params import Attention
 from gliderwatch.rules.acknowledged import acknowledge
-from gliderwatch.rules.announce import as_told, due
+from gliderwatch.rules.announce import Said, Thread, as_told, due
+from gliderwatch.rules.waiting import QuietHours, Wait
 from gliderwatch.run import intake
 from gliderwatch.run.manage import mute
 from gliderwatch.run.manage.incidents import ack, incidents
+from gliderwatch.run.operator import failing
 from gliderwatch.run.speaking import NOBODY
+from gliderwatch.run.status import as_json, overview
 from gliderwatch.store import backup
 from gliderwatch.store.database import MEMORY
 from gliderwatch.store.sqlite import Store
@@ -248,6 +256,69 @@ class TestMute:
             mute.unmute(muted, "electa", NOW)
 
 
+class TestWaiting:
+    """Who waits for an acknowledgement, and what `ack`, `mute` and `status` do about it."""
+
+    @pytest.fixture(autouse=True)
+    def held(self, config: Config) -> None:
+        """An alert that the duty pilot got and that waits for the chief; a notice that waits for morning."""
+        quiet = QuietHours(time(22), time(7), UTC, Severity.CRITICAL)
+        waits = {"mail": [Wait()], "sms": [Wait(after=1800.0)]}
+        said = Said((Thread(incident().id, incident(), incident().last, 1, 0.0),))
+        with closing(Store.open(Path(config.state.path))) as store:
+            store.say("electa", said, [alert()], lambda a: waits, NOW)
+            notice = alert("n", incident="", audience=Severity.INFO)
+            store.say("electa", said, [notice], lambda a: {"post": [Wait(quiet=quiet)]}, NOW)
+
+    def waiting(self, config: Config) -> list[tuple[str, str]]:
+        with closing(Store.reading(Path(config.state.path))) as store:
+            return [(u.alert, u.channel) for u in store.undelivered()]
+
+    def test_an_acknowledgement_withdraws_what_waits_for_it(self, config: Config) -> None:
+        assert self.waiting(config) == [("a1", "mail"), ("a1", "sms"), ("n", "post")]
+        ack(config, incident().id, "ann", "", NOW + 60)
+        assert self.waiting(config) == [("a1", "mail"), ("n", "post")]
+
+    def test_so_does_a_mute(self, config: Config) -> None:
+        mute.mute(config, "electa", NOW + 3600, NOW + 60)
+        assert self.waiting(config) == [("a1", "mail"), ("n", "post")]
+
+    def test_what_comes_after_it_is_for_who_was_told(self, config: Config) -> None:
+        ack(config, incident().id, "ann", "", NOW + 60)
+        with closing(Store.open(Path(config.state.path))) as store:
+            correction = [alert("a2", kind=Kind.CORRECTION)]
+            store.say("electa", store.said("electa"), correction, lambda a: {"sms": [Wait(after=1.0)]}, NOW)
+        assert self.waiting(config) == [("a1", "mail"), ("n", "post")]
+
+    def test_status_tells_what_is_held_and_that_it_is_no_trouble(
+        self, config: Config, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("gliderwatch.run.status.time.time", lambda: NOW + 60)
+        view = overview(config)
+        assert [u.channel for u in view.undelivered] == ["mail"]
+        assert as_json(view)["held"] == [
+            {
+                "alert": "a1",
+                "channel": "sms",
+                "until": "2023-11-14T22:43:20.000Z",
+                "unless_acknowledged": True,
+            },
+            {
+                "alert": "n",
+                "channel": "post",
+                "until": "2023-11-15T07:00:00.000Z",
+                "unless_acknowledged": False,
+            },
+        ]
+        console = Console(file=StringIO(), width=200)
+        tables.status(view, console)
+        assert isinstance(console.file, StringIO)
+        assert [line for line in console.file.getvalue().splitlines() if line.startswith("held")] == [
+            "held until 2023-11-14 22:43 UTC, unless acknowledged: a1 by sms",
+            "held until 2023-11-15 07:00 UTC (quiet hours): n by post",
+        ]
+
+
 class TestBackup:
     def test_is_whole_and_alone(self, config: Config, tmp_path: Path) -> None:
         target = tmp_path / "copies" / "copy.sqlite"
@@ -307,10 +378,18 @@ class TestBackup:
 
 
 def test_a_state_of_an_earlier_release_is_read_but_not_written(config: Config, tmp_path: Path) -> None:
-    with sqlite3.connect(tmp_path / "state.sqlite") as db:
-        db.executescript("DROP TABLE mutes; DROP TABLE acks; PRAGMA user_version = 2;")
+    path = tmp_path / "state.sqlite"
+    with closing(Store.open(path)) as store:
+        store.post(alert(), ["mail"], NOW)
+    with sqlite3.connect(path) as db:
+        db.executescript(
+            "DROP TABLE mutes; DROP TABLE acks; DROP INDEX outbox_by_delivery; PRAGMA user_version = 2;"
+            "ALTER TABLE outbox DROP COLUMN held_until; ALTER TABLE outbox DROP COLUMN escalates;"
+        )
+    assert [u.held_until for u in overview(config).undelivered] == [0.0]
+    assert failing(path, NOW) == {}
     assert [n.ack for n in incidents(config)] == [None]
     with pytest.raises(StateError, match="systemctl restart gliderwatch"):
         mute.mute(config, "electa", NOW + 60, NOW)
-    Store.open(tmp_path / "state.sqlite").close()
+    Store.open(path).close()
     assert mute.mute(config, "electa", NOW + 60, NOW) == ["electa: muted until 2023-11-14 22:14 UTC"]

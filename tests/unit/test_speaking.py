@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from datetime import time
 from pathlib import Path
 from typing import Any
+from zoneinfo import ZoneInfo
 
 import pytest
 
 from alert_support import alert
 from gliderwatch.config import Config, load
 from gliderwatch.model import Kind, Severity
+from gliderwatch.rules.waiting import QuietHours, Wait
+from gliderwatch.run import operator, replay
 from gliderwatch.run.speaking import NOBODY, channels, speaking
 
 
@@ -29,7 +33,7 @@ def config(folder: Path, **recipients: dict[str, Any]) -> Config:
 
 def told(settings: Config, **changes: Any) -> list[str]:
     base = replace(alert(), glider="electa", kind=Kind.ANOMALY, audience=Severity.CRITICAL)
-    return channels(replace(base, **changes), settings)
+    return list(channels(replace(base, **changes), settings))
 
 
 def test_each_channel_is_named_once_in_the_order_of_the_recipients(tmp_path: Path) -> None:
@@ -88,6 +92,34 @@ def test_a_message_of_no_glider_goes_by_its_severity(tmp_path: Path) -> None:
     own = {"glider": "", "kind": Kind.OPERATOR}
     assert told(settings, **own, audience=Severity.CRITICAL) == ["mail"]
     assert told(settings, **own, audience=Severity.INFO) == []
+
+
+def test_each_channel_tells_what_those_who_share_it_wait_for(tmp_path: Path) -> None:
+    night = {"start": "22:00", "end": "07:00", "time_zone": "Europe/Amsterdam", "below": "critical"}
+    settings = config(
+        tmp_path,
+        duty={"channels": ["mail", "sms"], "surfacing": ["electa"]},
+        chief={"channels": ["slack"], "unacknowledged_minutes": 30, "surfacing": ["electa"]},
+        owner={"channels": ["mail"], "quiet_hours": night, "unacknowledged_minutes": 0.5},
+    )
+    hours = QuietHours(time(22), time(7), ZoneInfo("Europe/Amsterdam"), Severity.CRITICAL)
+    assert channels(alert(), settings) == {
+        "mail": [Wait(), Wait(30.0, hours)],
+        "sms": [Wait()],
+        "slack": [Wait(1800.0)],
+    }
+    notice = replace(alert(), kind=Kind.SURFACING, incident="")
+    assert channels(notice, settings) == {"mail": [Wait()], "sms": [Wait()], "slack": [Wait()]}
+    assert operator.channels(settings, Severity.WARNING, "disk") == {
+        "mail": [Wait(), Wait(None, hours)],
+        "sms": [Wait()],
+        "slack": [Wait()],
+    }
+
+
+def test_a_replay_that_sends_waits_for_nothing(tmp_path: Path) -> None:
+    settings = config(tmp_path, chief={"channels": ["slack"], "unacknowledged_minutes": 30})
+    assert replay._at_once(settings).channels(alert()) == ["slack"]
 
 
 def test_nobody_is_nobody() -> None:

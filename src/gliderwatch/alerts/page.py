@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from html import escape
 
 from jinja2 import Environment, StrictUndefined
 
@@ -62,3 +63,8 @@ class Page:
     def html(self, title: str) -> str:
         """The page as HTML without tables, every value escaped."""
         return _HTML.render(title=title, page=self)
+
+
+def with_lead(html: str, line: str) -> str:
+    """HTML of a page with one more line above its title, the first paragraph."""
+    return html.replace("<p ", f"<p><b>{escape(line)}</b></p>\n<p ", 1)

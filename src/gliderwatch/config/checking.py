@@ -195,8 +195,13 @@ def _recipients(config: Config) -> _Findings:
     used = {channel for recipient in config.recipients.values() for channel in recipient.channels}
     for channel in sorted(set(config.channels) - used):
         yield _warning(f"channels.{channel}", "no recipient uses it", "name it in one")
-    if any(recipient.gliders is None for recipient in config.recipients.values()):
-        return
-    heard = {glider for recipient in config.recipients.values() for glider in recipient.gliders or ()}
-    for glider in sorted(set(config.gliders) - heard):
-        yield _warning(f"gliders.{glider}", "no recipient gets its alerts", "name it in one")
+    late: list[str] = []
+    for glider in sorted(config.gliders):
+        hear = [r for r in config.recipients.values() if r.gliders is None or glider in r.gliders]
+        if not hear:
+            yield _warning(f"gliders.{glider}", "no recipient gets its alerts", "name it in one")
+        elif all(r.unacknowledged_minutes is not None for r in hear):
+            late.append(glider)
+    if late:
+        text = f"nobody gets the alerts of these at once: {', '.join(late)}"
+        yield _warning("recipients", text, "leave `unacknowledged_minutes` out for who is on duty")

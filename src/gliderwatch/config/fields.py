@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
-from datetime import UTC, datetime
+from datetime import UTC, datetime, time
+from difflib import get_close_matches
 from typing import Annotated
+from zoneinfo import ZoneInfo, available_timezones
 
 from pydantic import (
     AfterValidator,
@@ -31,6 +33,31 @@ def _quieter(severity: Severity) -> Severity:
     if severity is Severity.CRITICAL:
         raise ValueError("must be info or warning: critical is for anomalies")
     return severity
+
+
+def _louder(severity: Severity) -> Severity:
+    if severity is Severity.INFO:
+        raise ValueError("must be warning or critical: nothing is below info")
+    return severity
+
+
+_CLOCK = r"^([01]\d|2[0-3]):[0-5]\d$"
+
+
+def _clock(value: object) -> object:
+    if not isinstance(value, str) or not re.fullmatch(_CLOCK, value, re.ASCII):
+        raise ValueError('must be a time of day, "00:00" to "23:59"')
+    return time.fromisoformat(value)
+
+
+def _zone(value: object) -> object:
+    try:
+        ZoneInfo(str(value))
+    except (LookupError, ValueError, OSError):
+        near = get_close_matches(str(value), available_timezones(), n=1)
+        cure = f"did you mean {near[0]}?" if near else "write UTC, or a name as Europe/Amsterdam"
+        raise ValueError(f"there is no such time zone ({cure})") from None
+    return value
 
 
 _MOMENT = r"^\d{4}-\d\d-\d\d([T ]\d\d:\d\d(:\d\d)?(Z|[+-]\d\d:\d\d)?)?$"
@@ -88,6 +115,14 @@ Loudness = Annotated[
     WithJsonSchema({"enum": ["info", "warning", "critical"]}),
 ]
 Quieter = Annotated[Loudness, AfterValidator(_quieter), WithJsonSchema({"enum": ["info", "warning"]})]
+Louder = Annotated[Loudness, AfterValidator(_louder), WithJsonSchema({"enum": ["warning", "critical"]})]
+ClockTime = Annotated[
+    time,
+    BeforeValidator(_clock),
+    PlainSerializer(lambda clock: f"{clock:%H:%M}", return_type=str),
+    WithJsonSchema({"type": "string", "pattern": _CLOCK}),
+]
+Zone = Annotated[str, Field(strict=True), AfterValidator(_zone)]
 Moment = Annotated[
     float,
     BeforeValidator(_moment),

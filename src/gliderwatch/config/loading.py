@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import UnionType
 from typing import Any, get_args, get_origin
 
 from pydantic import TypeAdapter, ValidationError
@@ -132,6 +133,11 @@ def _known_keys(annotation: Any, parts: list[str]) -> list[str]:
             annotation = get_args(annotation)[1]
         else:
             annotation = annotation.model_fields[part].annotation
+        choices = [
+            kind for kind in get_args(annotation) if isinstance(kind, type) and issubclass(kind, Section)
+        ]
+        if get_origin(annotation) is UnionType and choices:
+            annotation = choices[0]
     return list(annotation.model_fields) if issubclass(annotation, Section) else []
 
 

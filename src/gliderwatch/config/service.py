@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from ipaddress import ip_address
 from typing import Annotated, Literal
+from zoneinfo import ZoneInfo
 
 from pydantic import Field, IPvAnyAddress, model_validator
 
 from gliderwatch.config.fields import (
     AbsolutePath,
+    ClockTime,
     GliderName,
+    Louder,
     Loudness,
     Name,
     Number,
     Url,
+    Zone,
 )
 from gliderwatch.config.section import Section
 from gliderwatch.currents.field import STALE
 from gliderwatch.model import Severity
+from gliderwatch.rules import waiting
 
 
 class Dockserver(Section):
@@ -142,6 +147,25 @@ class Channel(Section):
     )
 
 
+class QuietHours(Section):
+    """Hours of the day in which only loud messages come; the others come when they end."""
+
+    start: ClockTime = Field(description="When they begin, as `22:00`.")
+    end: ClockTime = Field(description="When they end; earlier than `start`: the next day.")
+    time_zone: Zone = Field(default="UTC", description="By whose clock: `UTC`, `Europe/Amsterdam`, ...")
+    below: Louder = Field(default=Severity.CRITICAL, description="Messages quieter than this wait.")
+
+    @model_validator(mode="after")
+    def _last(self) -> QuietHours:
+        if self.start == self.end:
+            raise ValueError("start and end are the same: min_severity keeps quiet all day")
+        return self
+
+    def resolved(self) -> waiting.QuietHours:
+        """With the time zone."""
+        return waiting.QuietHours(self.start, self.end, ZoneInfo(self.time_zone), self.below)
+
+
 class Recipient(Section):
     """Who gets what, by which channels."""
 
@@ -158,3 +182,15 @@ class Recipient(Section):
         description="Whether they get the messages about the watch itself, whatever `min_severity` and "
         "`gliders` say. Where no recipient has it, all get those of their `min_severity`.",
     )
+    unacknowledged_minutes: Annotated[Number, Field(gt=0, le=10080)] | None = Field(
+        default=None,
+        description="They hear of an incident only when nobody has acknowledged it (`gliderwatch ack`) "
+        "within so many minutes; null: at once.",
+    )
+    quiet_hours: QuietHours | None = Field(default=None, description="When they want to sleep; null: never.")
+
+    def wait(self, can_be_acknowledged: bool) -> waiting.Wait:
+        """What they wait for, with a message that can be acknowledged or not."""
+        after = self.unacknowledged_minutes if can_be_acknowledged else None
+        quiet = self.quiet_hours.resolved() if self.quiet_hours is not None else None
+        return waiting.Wait(after * 60.0 if after is not None else None, quiet)

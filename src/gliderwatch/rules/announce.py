@@ -106,6 +106,19 @@ def due(
     return said, sorted(alerts, key=lambda a: a.time)
 
 
+def unanswered(said: Said, incidents: tuple[Incident, ...], acks: Acks) -> frozenset[str]:
+    """The threads of what goes on and nobody has taken on: open incidents, and gliders that stay away."""
+    matched = _matched(said.threads, incidents)
+    threads = {
+        thread.id
+        for thread in said.threads
+        if (now := matched.get(thread.id)) is not None
+        and now.cleared_at is None
+        and not _is_acknowledged(thread, now, acks)
+    }
+    return frozenset(threads | {silence.id for silence in said.silences if silence.called is None})
+
+
 def as_told(said: Said, known: Known) -> Said:
     """What was said, as of what is known after all was assessed anew by other code or parameters.
 

@@ -18,8 +18,8 @@ from gliderwatch.store.sqlite import File, Status, Store
 
 @dataclass(frozen=True, slots=True)
 class Speaking:
-    """Who is told: ``channels`` of an alert, of which gliders surfacing notices are wanted, and how the
-    silence of a glider is taken."""
+    """Who is told: ``channels`` of an alert (a mapping says what they wait for, see `store.outbox.post`), of
+    which gliders surfacing notices are wanted, and how the silence of a glider is taken."""
 
     channels: Callable[[Alert], Iterable[str]]
     notices: Callable[[str], bool]
@@ -165,7 +165,10 @@ def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: 
 def _speak(
     store: Store, glider: str, params: GliderParams, speaking: Speaking | None, now: float
 ) -> tuple[Alert, ...]:
-    if speaking is None or store.notes.heeded(glider, speaking.attention(glider)).is_quiet(now):
+    if speaking is None:
+        return ()
+    if store.notes.heeded(glider, speaking.attention(glider)).is_quiet(now):
+        store.answer(glider, now, quiet=True)
         return ()
     before, known = store.said(glider), store.known(glider)
     silences, heard = overdue.hear(before.silences, known, now)

@@ -23,6 +23,7 @@ from gliderwatch.rules.overdue import RECENT
 from gliderwatch.rules.silence import GONE, awaited
 from gliderwatch.run.life import STALE
 from gliderwatch.run.operator import last_files, reading
+from gliderwatch.store.outbox import released
 from gliderwatch.store.sqlite import File, Status, Store
 
 log = structlog.get_logger(__name__)
@@ -128,7 +129,7 @@ class Metrics:
             is_open = [i for i in store.incidents(name) if i.cleared_at is None]
             self.incidents.labels(name).set(len(is_open))
             self.overdue.labels(name).set(_is_overdue(store, config, name, now))
-        delays, failed, waiting = self._outbox.look()
+        delays, failed, waiting = self._outbox.look(now)
         for channel, seconds in delays:
             self.delivery.labels(channel).observe(seconds)
         for channel, number in failed:
@@ -161,33 +162,38 @@ class Outbox:
         self._attempts: dict[int, int] = {}
         self._delivered: set[int] = set()
         self._from = 0
-        self.look()
+        self.look(0.0)
 
-    def look(self) -> tuple[list[tuple[str, float]], list[tuple[str, int]], Mapping[str, int]]:
-        """By channel: seconds of each new delivery, number of new failures, number of messages that wait."""
+    def look(self, now: float) -> tuple[list[tuple[str, float]], list[tuple[str, int]], Mapping[str, int]]:
+        """By channel: seconds of each new delivery, number of new failures, number of messages that wait.
+
+        What is held at `now` (s) does not wait; what was given up or withdrawn is no delivery.
+        """
         delays: list[tuple[str, float]] = []
         failed: list[tuple[str, int]] = []
         waiting: dict[str, int] = {}
         rows = self._rows()
         for row in rows:
-            number, channel, attempts, delivered_at, made_at = row
+            number, channel, attempts, delivered_at, due, error = row
             if more := attempts - self._attempts.get(number, 0):
                 failed.append((channel, more))
                 self._attempts[number] = attempts
             if delivered_at is None:
-                waiting[channel] = waiting.get(channel, 0) + 1
+                waiting[channel] = waiting.get(channel, 0) + (due <= now)
             elif number not in self._delivered:
                 self._delivered.add(number)
-                delays.append((channel, max(0.0, delivered_at - made_at)))
+                if not error:
+                    delays.append((channel, max(0.0, delivered_at - due)))
         self._move_on([row[0] for row in rows if row[3] is None], rows)
         return delays, failed, waiting
 
     def _rows(self) -> list[Any]:
-        sql = (
-            "SELECT o.id, o.channel, o.attempts, o.delivered_at, a.made_at "
-            "FROM outbox o JOIN alerts a ON a.id = o.alert WHERE o.id > ? ORDER BY o.id"
-        )
         with reading(self._state) as db:
+            sql = (
+                "SELECT o.id, o.channel, o.attempts, o.delivered_at, "
+                f"max(a.made_at, {released(db)}), o.error "
+                "FROM outbox o JOIN alerts a ON a.id = o.alert WHERE o.id > ? ORDER BY o.id"
+            )
             return list(db.execute(sql, (self._from,)))
 
     def _move_on(self, waiting: list[int], rows: list[Any]) -> None:

@@ -17,7 +17,9 @@ from gliderwatch.alerts.words import duration, utc
 from gliderwatch.config import Config
 from gliderwatch.config.service import Operator as Settings
 from gliderwatch.model import Alert, Severity
+from gliderwatch.run.speaking import Waits, waits
 from gliderwatch.store.database import guarded, read_only
+from gliderwatch.store.outbox import REFUSED, released
 from gliderwatch.store.sqlite import Store
 
 DAY, HOUR = 86400.0, 3600.0
@@ -27,7 +29,7 @@ _ROOT, _OVER = "operator/", "/over"
 
 @dataclass(frozen=True, slots=True)
 class Failing:
-    """A channel with messages that it did not take: the oldest was made ``since`` (s)."""
+    """A channel with messages that it did not take: the oldest was to go out ``since`` (s)."""
 
     since: float
     messages: int
@@ -83,7 +85,8 @@ def troubles(vitals: Vitals, limits: Settings, open_: Iterable[str], now: float)
         if limits.channel_hours is not None and late > limits.channel_hours * HOUR:
             found[f"{CHANNEL}/{name}"] = Trouble(
                 f"channel {name} has not delivered for {duration(late)}",
-                f"{channel.messages} messages wait for it and are tried again.\n"
+                f"{channel.messages} messages were not taken. All that it did not refuse for good is tried "
+                "again.\n"
                 f"The reason it gives: {channel.error or 'none'}",
             )
     return found
@@ -96,19 +99,20 @@ def over(key: str) -> str:
         SILENCE: "files come again",
         QUARANTINE: "hardly any files are quarantined any more",
         DISK: "there is room on the disk again",
-        CHANNEL: f"channel {name} delivers again",
+        CHANNEL: f"channel {name} does not fail any more",
     }[kind]
 
 
-def channels(config: Config, audience: Severity, key: str) -> list[str]:
+def channels(config: Config, audience: Severity, key: str) -> Waits:
     """The channels of those who hear of a trouble, but not the one that it is about.
 
-    They are the operators; where there are none, all who want messages of this severity.
+    They are the operators; where there are none, all who want messages of this severity. A trouble cannot be
+    acknowledged: it waits for quiet hours alone.
     """
     recipients = list(config.recipients.values())
     chosen = [r for r in recipients if r.operator] or [r for r in recipients if audience >= r.min_severity]
-    names = dict.fromkeys(name for r in chosen for name in r.channels)
-    return [name for name in names if key != f"{CHANNEL}/{name}"]
+    found = waits(chosen, can_be_acknowledged=False)
+    return {name: wait for name, wait in found.items() if key != f"{CHANNEL}/{name}"}
 
 
 @contextmanager
@@ -118,14 +122,21 @@ def reading(state: Path) -> Iterator[Any]:
         yield db
 
 
-def failing(state: Path) -> dict[str, Failing]:
-    """Channels that refused or failed to take a message that still waits."""
-    sql = (
-        "SELECT o.channel, min(a.made_at), count(*), o.error FROM outbox o JOIN alerts a ON a.id = o.alert "
-        "WHERE o.delivered_at IS NULL AND o.attempts > 0 GROUP BY o.channel"
-    )
+def failing(state: Path, now: float) -> dict[str, Failing]:
+    """Channels that failed to take a message that still waits, or that refused one for good in the day before
+    `now` (s) and have delivered none since. What is held does not wait before it is due."""
     with reading(state) as db:
-        return {row[0]: Failing(*row[1:]) for row in db.execute(sql)}
+        since = f"max(a.made_at, {released(db)})"
+        sql = (
+            "SELECT channel, min(since), count(*), error FROM ("
+            f"SELECT o.channel, {since} AS since, o.error FROM outbox o JOIN alerts a ON a.id = o.alert "
+            "WHERE o.delivered_at IS NULL AND o.attempts > 0 UNION ALL "
+            f"SELECT o.channel, {since} AS since, o.error FROM outbox o JOIN alerts a ON a.id = o.alert "
+            "WHERE o.delivered_at > ? AND o.error LIKE ? || '%' AND NOT EXISTS (SELECT 1 FROM outbox l "
+            "WHERE l.delivered_at > o.delivered_at AND l.channel = o.channel AND l.error = '')) "
+            "GROUP BY channel"
+        )
+        return {row[0]: Failing(*row[1:]) for row in db.execute(sql, (now - DAY, REFUSED))}
 
 
 def quarantined(state: Path, since: float) -> int:
@@ -171,7 +182,7 @@ class Operator:
     def vitals(self, config: Config, now: float, monotonic: float) -> Vitals:
         """How the watch is now."""
         at_sea = any(not glider.recovered for glider in config.gliders.values())
-        waiting = {name: f for name, f in failing(self._state).items() if name in config.channels}
+        waiting = {name: f for name, f in failing(self._state, now).items() if name in config.channels}
         return Vitals(
             monotonic - self._heard if at_sea else None,
             quarantined(self._state, now - DAY),

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from gliderwatch.config import Config
+from collections.abc import Iterable
+
+from gliderwatch.config import Config, Recipient
 from gliderwatch.model import Alert, Kind
+from gliderwatch.rules.waiting import Wait
 from gliderwatch.run.intake import Speaking
 
 NOBODY = Speaking(channels=lambda alert: (), notices=lambda glider: False)
+Waits = dict[str, list[Wait]]
+"""What the recipients of a message by each channel wait for."""
 
 
 def speaking(config: Config) -> Speaking:
@@ -18,18 +23,27 @@ def speaking(config: Config) -> Speaking:
     )
 
 
-def channels(alert: Alert, config: Config) -> list[str]:
-    """The channels of all who are to get an alert, each once.
+def channels(alert: Alert, config: Config) -> Waits:
+    """The channels of all who are to get an alert, each with what they wait for.
 
-    A message of the operator's kind has no glider and goes by its severity alone.
+    A message of the operator's kind has no glider and goes by its severity alone. Only what belongs to an
+    incident can be acknowledged.
     """
-    names: dict[str, None] = {}
-    for recipient in config.recipients.values():
-        if alert.kind == Kind.SURFACING:
-            wanted = alert.glider in recipient.surfacing
-        else:
-            theirs = not alert.glider or recipient.gliders is None or alert.glider in recipient.gliders
-            wanted = theirs and alert.audience >= recipient.min_severity
-        if wanted:
-            names |= dict.fromkeys(recipient.channels)
-    return list(names)
+    if alert.kind == Kind.SURFACING:
+        return waits((r for r in config.recipients.values() if alert.glider in r.surfacing), False)
+    wanted = (
+        r
+        for r in config.recipients.values()
+        if (not alert.glider or r.gliders is None or alert.glider in r.gliders)
+        and alert.audience >= r.min_severity
+    )
+    return waits(wanted, bool(alert.incident))
+
+
+def waits(recipients: Iterable[Recipient], can_be_acknowledged: bool) -> Waits:
+    """The channels of some recipients, each with what those wait for who share it."""
+    found: Waits = {}
+    for recipient in recipients:
+        for channel in recipient.channels:
+            found.setdefault(channel, []).append(recipient.wait(can_be_acknowledged))
+    return found

@@ -70,7 +70,10 @@ class GliderStatus:
 
 @dataclass(frozen=True, slots=True)
 class Overview:
-    """All that `status` tells: whether the daemon is ``running``, since when it is silent (s; None: ever)."""
+    """All that `status` tells: whether the daemon is ``running``, since when it is silent (s; None: ever).
+
+    ``held`` are messages that are to wait; ``undelivered`` those that should have been delivered.
+    """
 
     running: bool
     silent_for: float | None
@@ -80,6 +83,7 @@ class Overview:
     quarantined: tuple[File, ...]
     unknown: tuple[File, ...]
     undelivered: tuple[Undelivered, ...]
+    held: tuple[Undelivered, ...] = ()
 
     @property
     def alive(self) -> bool:
@@ -90,18 +94,20 @@ class Overview:
 def overview(config: Config) -> Overview:
     """Look into the state file of a configuration. Raises StateError where there is none."""
     path = Path(config.state.path)
-    store = Store.reading(path)
+    store, now = Store.reading(path), time.time()
     try:
+        waiting = store.undelivered()
         names = sorted({*config.gliders, *store.gliders()})
         return Overview(
             running=is_held(path),
             silent_for=silence(path),
-            gliders=tuple(_glider(store, name, config, time.time()) for name in names),
+            gliders=tuple(_glider(store, name, config, now) for name in names),
             files=store.counts(),
             waiting=tuple(store.files(Status.WAITING)),
             quarantined=tuple(store.files(Status.QUARANTINED)),
             unknown=tuple(store.files(Status.UNKNOWN)),
-            undelivered=(*store.undelivered(), *store.refused(time.time() - WEEK)),
+            undelivered=(*(u for u in waiting if u.held_until <= now), *store.refused(now - WEEK)),
+            held=tuple(u for u in waiting if u.held_until > now),
         )
     finally:
         store.close()
@@ -144,6 +150,15 @@ def as_json(view: Overview) -> dict[str, Any]:
         "undelivered": [
             {"alert": u.alert, "channel": u.channel, "attempts": u.attempts, "error": u.error}
             for u in view.undelivered
+        ],
+        "held": [
+            {
+                "alert": u.alert,
+                "channel": u.channel,
+                "until": iso(u.held_until),
+                "unless_acknowledged": u.escalates,
+            }
+            for u in view.held
         ],
     }
 

@@ -124,9 +124,11 @@ def _save(aside: Path, db: sqlite3.Connection) -> int:
                 _put(db, "INSERT OR IGNORE INTO alerts VALUES (?, ?, ?, ?, ?)", row)
                 kept.add(row[0])
         columns = "alert, channel, incident, attempts, next_try, delivered_at, error"
-        for row in _rows(damaged, f"SELECT {columns} FROM outbox ORDER BY id"):
-            if row[0] in kept:
-                _put(db, f"INSERT OR IGNORE INTO outbox ({columns}) VALUES (?, ?, ?, ?, ?, ?, ?)", row)
+        for wait in (", held_until, escalates", ""):  # of an earlier release it has no such columns
+            for row in _rows(damaged, f"SELECT {columns}{wait} FROM outbox ORDER BY id"):
+                if row[0] in kept:
+                    marks = ", ".join("?" * len(row))
+                    _put(db, f"INSERT OR IGNORE INTO outbox ({columns}{wait}) VALUES ({marks})", row)
     return len(kept)
 
 

@@ -12,7 +12,7 @@ from gliderwatch.errors import DamagedError, StateError
 
 __all__ = ["MEMORY", "SCHEMA", "StateError", "connect", "guarded", "read_only", "schema"]
 
-SCHEMA = 3
+SCHEMA = 4
 MIGRATIONS: dict[int, str] = {
     2: """
 CREATE TABLE expected (           -- the next surfacing, as expected after each segment
@@ -48,6 +48,11 @@ CREATE TABLE acks (               -- incidents that somebody has taken on, by th
     data     TEXT NOT NULL
 ) STRICT;
 CREATE INDEX acks_by_glider ON acks (glider);
+""",
+    4: """
+ALTER TABLE outbox ADD COLUMN held_until REAL NOT NULL DEFAULT 0;     -- not sent before; infinite: never
+ALTER TABLE outbox ADD COLUMN escalates REAL NOT NULL DEFAULT 9e999;  -- while nobody acknowledges, sent then
+CREATE INDEX outbox_by_delivery ON outbox (delivered_at);
 """,
 }
 """SQL that leads from the schema before to the one of the key. A state file is never written by an older

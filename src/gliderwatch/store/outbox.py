@@ -1,21 +1,30 @@
 """The outbox table as the dispatcher sees it.
 
 A row is done with once ``delivered_at`` is set. Where ``error`` is not empty then, it was not delivered but
-given up: the channel refused it for good, or it cannot be read any more.
+given up (the channel refused it for good, or it cannot be read any more) or withdrawn, because somebody had
+acknowledged its incident before it was due.
+
+A row is held until ``held_until``, or until ``escalates`` while nobody has acknowledged its incident,
+whichever is first (`rules.waiting`); infinite is never. Within an incident and channel no row is held longer
+than a later one: what is urgent brings along what came before it.
 """
 
 from __future__ import annotations
 
 import math
 import sqlite3
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
+from gliderwatch.alerts.escalation import escalated
 from gliderwatch.alerts.outbox import LONGEST_DELAY, OutboxRow
 from gliderwatch.errors import DamagedError
 from gliderwatch.model import Alert
+from gliderwatch.rules import waiting
+from gliderwatch.rules.waiting import AT_ONCE, NO_INCIDENT, Standing
 from gliderwatch.store import codec
 from gliderwatch.store.database import connect
+from gliderwatch.store.rows import Undelivered
 
 PARKED = math.inf
 """`next_try` of rows whose channel is not in the configuration."""
@@ -23,16 +32,106 @@ FAR = 1e300
 """Any time (s) but that."""
 
 
-def post(db: sqlite3.Connection, alert: Alert, channels: Iterable[str], now: float) -> None:
-    """Keep one message and put it into the outbox of its channels; a known id is left alone."""
+SET_BACK = 60.0
+"""Seconds: a clock that is that far before the time when a message was made was set back since. By such a
+clock nothing is held."""
+REFUSED, WITHDRAWN = "refused: ", "withdrawn: "
+"""How the ``error`` of rows begins that a channel refused for good, and of those that were withdrawn."""
+HELD = f"(o.held_until > :now AND o.escalates > :now AND :now >= a.made_at - {SET_BACK})"
+"""SQL: whether a row of the outbox ``o`` and its message ``a`` is held at a time `now`."""
+
+
+def post(
+    db: sqlite3.Connection,
+    alert: Alert,
+    channels: Iterable[str],
+    now: float,
+    unanswered: Collection[str] = (),
+) -> None:
+    """Keep one message and put it into the outbox of its channels; a known id is left alone.
+
+    A mapping of `channels` tells what the recipients of each wait for; of names alone they get it at once.
+    `unanswered` are the threads that go on and that nobody has taken on.
+    """
     db.execute(
         "INSERT OR IGNORE INTO alerts VALUES (?, ?, ?, ?, ?)",
         (alert.id, alert.glider, alert.time, now, codec.plain_encode(alert)),
     )
+    waits = channels if isinstance(channels, Mapping) else dict.fromkeys(channels, AT_ONCE)
+    for channel, wait in waits.items():
+        standing = NO_INCIDENT
+        if alert.incident and any(w.after is not None for w in wait):
+            standing = _standing(db, alert.incident, channel, now, alert.incident in unanswered)
+        due = waiting.due(wait, alert.audience, now, standing)
+        if due is None:
+            continue
+        db.execute(
+            "INSERT OR IGNORE INTO outbox (alert, channel, incident, held_until, escalates) "
+            "VALUES (?, ?, ?, ?, ?)",
+            (alert.id, channel, alert.incident, due.at, due.escalates),
+        )
+        db.execute(
+            "UPDATE outbox SET held_until = min(held_until, ?), escalates = min(escalates, ?) "
+            "WHERE delivered_at IS NULL AND channel = ? AND incident = ? AND incident != '' "
+            "AND min(held_until, escalates) > ?",
+            (due.at, due.escalates, channel, alert.incident, now),
+        )
+
+
+def _standing(db: sqlite3.Connection, incident: str, channel: str, now: float, unanswered: bool) -> Standing:
+    told, escalates = db.execute(
+        f"SELECT coalesce(max(iif(o.delivered_at IS NULL, NOT {HELD}, o.error = '')), 0), "
+        "coalesce(min(iif(o.delivered_at IS NULL, o.escalates, NULL)), 9e999) "
+        "FROM outbox o JOIN alerts a ON a.id = o.alert WHERE o.channel = :channel AND o.incident = :incident",
+        {"now": now, "channel": channel, "incident": incident},
+    ).fetchone()
+    return Standing(bool(told), unanswered, escalates)
+
+
+def withdraw(db: sqlite3.Connection, glider: str, unanswered: Collection[str], now: float) -> None:
+    """Escalate what is held of a glider no more, but for the threads that are `unanswered`.
+
+    What is held for that alone is done with; what is held for quiet hours too goes on being held for them.
+    """
+    rows = db.execute(
+        "SELECT o.id, o.incident FROM outbox o JOIN alerts a ON a.id = o.alert "
+        f"WHERE o.delivered_at IS NULL AND o.escalates < 9e999 AND a.glider = :glider AND {HELD}",
+        {"glider": glider, "now": now},
+    ).fetchall()
+    ids = [row[0] for row in rows if row[1] not in unanswered]
     db.executemany(
-        "INSERT OR IGNORE INTO outbox (alert, channel, incident) VALUES (?, ?, ?)",
-        [(alert.id, channel, alert.incident) for channel in channels],
+        "UPDATE outbox SET delivered_at = ?, error = ? WHERE id = ? AND held_until = 9e999",
+        [(now, f"{WITHDRAWN}acknowledged, muted or over", n) for n in ids],
     )
+    db.executemany("UPDATE outbox SET escalates = 9e999 WHERE id = ?", [(n,) for n in ids])
+
+
+def released(db: sqlite3.Connection) -> str:
+    """SQL: until when a row of the outbox ``o`` is or was held (s), also in a file that the service has not
+    migrated yet."""
+    known = "SELECT 1 FROM pragma_table_info('outbox') WHERE name = 'escalates'"
+    return "min(o.held_until, o.escalates)" if db.execute(known).fetchone() is not None else "0.0"
+
+
+def undelivered(db: sqlite3.Connection) -> list[Undelivered]:
+    """What waits in the outbox, oldest first."""
+    until = released(db)
+    escalates = "0" if until == "0.0" else "o.escalates < o.held_until"
+    rows = db.execute(
+        f"SELECT o.alert, o.channel, o.attempts, o.error, {until}, {escalates} FROM outbox o "
+        "WHERE o.delivered_at IS NULL ORDER BY o.id"
+    )
+    return [Undelivered(row[0], row[1], row[2], row[3], row[4], bool(row[5])) for row in rows]
+
+
+def refused(db: sqlite3.Connection, since: float) -> list[Undelivered]:
+    """What a channel refused for good, or could not be read, since a time (s); oldest first."""
+    rows = db.execute(
+        "SELECT alert, channel, attempts, error FROM outbox WHERE delivered_at >= ? AND error != '' "
+        "AND error NOT LIKE ? || '%' ORDER BY id",
+        (since, WITHDRAWN),
+    )
+    return [Undelivered(*row) for row in rows]
 
 
 class Outbox:
@@ -45,28 +144,34 @@ class Outbox:
         """Undelivered rows to try now, oldest first, none before an older one of its thread and channel.
 
         A row that cannot be read is given up, so that it keeps no other back. One whose time is farther off
-        than any delay was put off by a clock that has been set back since: it is due.
+        than any delay was put off by a clock that has been set back since: it is due. One that goes out
+        because nobody has acknowledged its incident says so.
         """
         rows = self._db.execute(
-            "SELECT o.id, a.data, o.channel, o.attempts FROM outbox o JOIN alerts a ON a.id = o.alert "
-            "WHERE o.delivered_at IS NULL AND (o.next_try <= ?1 OR o.next_try BETWEEN ?1 + ?2 AND ?3) "
+            "SELECT o.id, a.data, o.channel, o.attempts, o.held_until > :now AND o.escalates < 9e999, "
+            "o.escalates - a.made_at FROM outbox o JOIN alerts a ON a.id = o.alert "
+            "WHERE o.delivered_at IS NULL "
+            f"AND (o.next_try <= :now OR o.next_try BETWEEN :now + :late AND :far) AND NOT {HELD} "
             "AND NOT EXISTS (SELECT 1 FROM outbox e WHERE e.delivered_at IS NULL AND e.channel = o.channel "
             "AND e.incident = o.incident AND e.incident != '' AND e.id < o.id) ORDER BY o.id",
-            (now, 2 * LONGEST_DELAY, FAR),
+            {"now": now, "late": 2 * LONGEST_DELAY, "far": FAR},
         ).fetchall()
         found = []
         for row in rows:
             try:
-                found.append(OutboxRow(row[0], codec.plain_decode(row[1], Alert), row[2], row[3]))
+                alert = codec.plain_decode(row[1], Alert)
             except DamagedError as error:
                 self._give_up(row[0], f"given up: {error}", now)
+                continue
+            found.append(OutboxRow(row[0], escalated(alert, row[5]) if row[4] else alert, row[2], row[3]))
         return found
 
     def delivered(self, row_id: int, now: float) -> None:
-        """Mark a row as delivered."""
+        """Mark a row as delivered, also one that was withdrawn while it was on its way."""
         self._db.execute(
-            "UPDATE outbox SET delivered_at = ?, error = '' WHERE id = ? AND delivered_at IS NULL",
-            (now, row_id),
+            "UPDATE outbox SET delivered_at = ?, error = '' "
+            "WHERE id = ? AND (delivered_at IS NULL OR error LIKE ? || '%')",
+            (now, row_id, WITHDRAWN),
         )
 
     def failed(self, row_id: int, error: str, next_try: float) -> None:
@@ -83,7 +188,7 @@ class Outbox:
         """Give a row up, and put a report of it into the outbox of other channels, both or none."""
         self._db.execute("BEGIN IMMEDIATE")
         try:
-            self._give_up(row_id, f"refused: {error}", now)
+            self._give_up(row_id, f"{REFUSED}{error}", now)
             if report is not None:
                 post(self._db, report, channels, now)
             self._db.execute("COMMIT")

@@ -37,12 +37,18 @@ class File:
 
 @dataclass(frozen=True, slots=True)
 class Undelivered:
-    """A message that waits for a channel; ``error`` is the reason of the last failed attempt."""
+    """A message that waits for a channel; ``error`` is the reason of the last failed attempt.
+
+    It is not sent before ``held_until`` (s), and not at all where its incident is acknowledged by then, if
+    ``escalates``.
+    """
 
     alert: str
     channel: str
     attempts: int
     error: str
+    held_until: float = 0.0
+    escalates: bool = False
 
 
 def file_of(row: sqlite3.Row) -> File:

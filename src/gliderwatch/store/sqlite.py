@@ -14,14 +14,13 @@ from gliderwatch.model import Alert, Assessment, Expected, Incident, Segment, Se
 from gliderwatch.navigation.quality import NOT_SURFACED
 from gliderwatch.navigation.samples import compact
 from gliderwatch.pipeline import GliderState, Outcome
-from gliderwatch.rules.announce import Said
+from gliderwatch.rules.announce import Said, unanswered
 from gliderwatch.rules.silence import Sign
-from gliderwatch.store import codec, retention
+from gliderwatch.store import codec, outbox, retention
 from gliderwatch.store.ahead import Ahead
 from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, read_only
 from gliderwatch.store.known import Known
 from gliderwatch.store.notes import Notes
-from gliderwatch.store.outbox import post
 from gliderwatch.store.rows import File, Status, Undelivered, file_of
 
 __all__ = ["File", "Known", "Status", "Store", "Undelivered"]
@@ -335,14 +334,30 @@ class Store:
         channels: Callable[[Alert], Iterable[str]],
         now: float,
     ) -> None:
-        """Keep messages, one outbox row for each of their channels, and that they have been said."""
+        """Keep messages, one outbox row for each of their channels, and that they have been said.
+
+        What is held of incidents that are over by then is withdrawn (`answer`).
+        """
         self._db.execute("INSERT OR REPLACE INTO said VALUES (?, ?)", (glider, codec.plain_encode(said)))
+        going_on = self.answer(glider, now)
         for alert in alerts:
-            self.post(alert, channels(alert), now)
+            outbox.post(self._db, alert, channels(alert), now, going_on)
+
+    def answer(self, glider: str, now: float, *, quiet: bool = False) -> frozenset[str]:
+        """The threads that go on and that nobody has taken on, none of a glider that is `quiet`.
+
+        What is held of the others until it escalates is withdrawn.
+        """
+        going_on = frozenset[str]()
+        if not quiet:
+            incidents, acks = tuple(self.incidents(glider)), self.notes.acks(glider)
+            going_on = unanswered(self.said(glider), incidents, acks)
+        outbox.withdraw(self._db, glider, going_on, now)
+        return going_on
 
     def post(self, alert: Alert, channels: Iterable[str], now: float) -> None:
-        """Keep one message and put it into the outbox of its channels; a known id is left alone."""
-        post(self._db, alert, channels, now)
+        """Keep one message about no glider and put it into the outbox of its channels, as `outbox.post`."""
+        outbox.post(self._db, alert, channels, now)
 
     def alerts(self) -> list[Alert]:
         """All messages, in the order in which they were made."""
@@ -350,19 +365,11 @@ class Store:
 
     def undelivered(self) -> list[Undelivered]:
         """What waits in the outbox, oldest first."""
-        rows = self._db.execute(
-            "SELECT alert, channel, attempts, error FROM outbox WHERE delivered_at IS NULL ORDER BY id"
-        )
-        return [Undelivered(*row) for row in rows]
+        return outbox.undelivered(self._db)
 
     def refused(self, since: float) -> list[Undelivered]:
         """What a channel refused for good, or could not be read, since a time (s); oldest first."""
-        rows = self._db.execute(
-            "SELECT alert, channel, attempts, error FROM outbox WHERE delivered_at >= ? AND error != '' "
-            "ORDER BY id",
-            (since,),
-        )
-        return [Undelivered(*row) for row in rows]
+        return outbox.refused(self._db, since)
 
     def _all(self, sql: str, values: tuple[object, ...], kind: type[T]) -> list[T]:
         return [codec.plain_decode(row[0], kind) for row in self._db.execute(sql, values)]

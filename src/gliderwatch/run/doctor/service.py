@@ -67,7 +67,7 @@ def channels(config: Config, problems: Iterable[Problem], send: bool) -> Finding
     found = of_check("channels", problems, "channels", "recipients")
     yield from found
     bad = {f.text.split(".")[1] for f in found if ": channels." in f.text and f.level == Level.ERROR}
-    waiting = failing(Path(config.state.path)) if Path(config.state.path).exists() else {}
+    waiting = failing(Path(config.state.path), time.time()) if Path(config.state.path).exists() else {}
     for name in config.channels:
         trouble = waiting.get(name)
         if name in bad:
@@ -77,7 +77,9 @@ def channels(config: Config, problems: Iterable[Problem], send: bool) -> Finding
             yield error("channels", f"{name} did not take a test message: {refused}", "compare its URL")
         elif trouble is not None:
             late = duration(max(0.0, time.time() - trouble.since))
-            text = f"{name}: {trouble.messages} messages wait, the oldest for {late}: {trouble.error}"
+            text = (
+                f"{name}: {trouble.messages} messages not delivered, the oldest for {late}: {trouble.error}"
+            )
             yield warning("channels", text, f"gliderwatch test-alert --channel {name}")
         else:
             yield ok("channels", f"{name} took a test message" if send else f"{name} can be used")

@@ -52,6 +52,7 @@ def _of(store: Store, glider: str, every: bool) -> list[Noted]:
 def ack(config: Config, identity: str, by: str, note: str, now: float) -> tuple[Noted, bool]:
     """Take an open incident on; with it, and whether that is new: the same once more changes nothing.
 
+    Who waits for an acknowledgement is not told of it any more.
     Raises GliderwatchError, naming those that are open, where it is none of them.
     """
     with writing(config) as store:
@@ -64,6 +65,7 @@ def ack(config: Config, identity: str, by: str, note: str, now: float) -> tuple[
             return noted, False
         made = acknowledge(noted.incident, by, note, now)
         store.notes.acknowledge(noted.incident.glider, made)
+        store.answer(noted.incident.glider, now)
     return Noted(noted.incident, made), True
 
 

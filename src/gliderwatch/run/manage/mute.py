@@ -37,10 +37,12 @@ def until(date: str | None, hours: float | None, now: float) -> float:
 
 
 def mute(config: Config, glider: str, end: float, now: float) -> list[str]:
-    """Tell nothing of a glider until a time (s); what to tell who asked for it, in lines."""
+    """Tell nothing of a glider until a time (s); what to tell who asked for it, in lines. Who waits for an
+    acknowledgement is not told of it any more either."""
     name = known_glider(config, glider)
     with writing(config) as store:
         store.notes.mute(name, end, now)
+        store.answer(name, now, quiet=True)
         heeded = store.notes.heeded(name, config.attention(name))
     told = [f"{name}: muted until {utc(end)}"]
     if heeded.muted_until is not None and heeded.muted_until > end:

@@ -1,0 +1,103 @@
+"""When a message goes out: quiet hours, and people who are told only what nobody has taken on. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import datetime, time, timedelta, tzinfo
+from math import inf
+
+from gliderwatch.model import Severity
+
+
+@dataclass(frozen=True, slots=True)
+class QuietHours:
+    """From ``start`` to ``end`` by the clock of a ``zone``, over midnight where ``end`` is the earlier of the
+    two, messages ``below`` a severity wait."""
+
+    start: time
+    end: time
+    zone: tzinfo
+    below: Severity
+
+    def holds(self, t: float) -> bool:
+        """Whether a time (s) lies in them."""
+        clock = datetime.fromtimestamp(t, self.zone).time()
+        if self.start < self.end:
+            return self.start <= clock < self.end
+        return clock >= self.start or clock < self.end
+
+    def until(self, t: float) -> float:
+        """Their end, where a time (s) lies in them, else the time itself.
+
+        An end that the clock leaves out when it is put forward is taken by the offset before, as RFC 5545
+        (3.3.5) does. Of one that comes twice it is the first that is still to come.
+        """
+        if not self.holds(t):
+            return t
+        day = datetime.fromtimestamp(t, self.zone).date()
+        ends = (
+            datetime.combine(day + timedelta(days=n), self.end, self.zone).replace(fold=fold).timestamp()
+            for n in range(4)
+            for fold in (0, 1)
+        )
+        return min(end for end in ends if end > t and not self.holds(end))
+
+
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """What one recipient waits for: they hear of an incident ``after`` a time (s) without acknowledgement
+    (None: at once), and not in their ``quiet`` hours."""
+
+    after: float | None = None
+    quiet: QuietHours | None = None
+
+    def until(self, t: float, severity: Severity) -> float:
+        """When they get what is meant for a time (s)."""
+        return t if self.quiet is None or severity >= self.quiet.below else self.quiet.until(t)
+
+
+AT_ONCE = (Wait(),)
+"""The wait of a channel whose recipients wait for nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """How an incident stands with a channel: whether the channel has ``told`` of it, whether it is
+    ``unanswered`` (it goes on, and nobody has taken it on), and when that what waits there ``escalates`` (s;
+    infinite: nothing waits)."""
+
+    told: bool
+    unanswered: bool
+    escalates: float = inf
+
+
+NO_INCIDENT = Standing(told=True, unanswered=False)
+"""For messages that nobody can acknowledge."""
+
+
+@dataclass(frozen=True, slots=True)
+class Due:
+    """When a message goes out: ``at`` a time (s; 0: at once, infinite: never) in any case, and earlier if it
+    ``escalates`` (s; infinite: never): while nobody has acknowledged its incident."""
+
+    at: float
+    escalates: float
+
+
+def due(waits: Iterable[Wait], severity: Severity, now: float, standing: Standing) -> Due | None:
+    """When a message made `now` (s) goes out by a channel whose recipients wait so; None: it does not.
+
+    The one of them who waits least decides. Whoever waits for an acknowledgement hears of an incident from
+    when they were first told of it on, or not at all.
+    """
+    at = escalates = inf
+    for wait in waits:
+        if wait.after is None or standing.told:
+            at = min(at, wait.until(now, severity))
+        elif standing.unanswered:
+            begins = now + wait.after if standing.escalates == inf else standing.escalates
+            escalates = min(escalates, wait.until(begins, severity))
+    if at == escalates == inf:
+        return None
+    return Due(at if at > now else 0.0, escalates if escalates < at else inf)
