@@ -216,9 +216,14 @@ class TestMail:
 
     def test_all_refused(self, post: Post) -> None:
         post.inbox.refuse = {"pilot@example.org"}
-        with pytest.raises(DeliveryError, match="550"):
+        with pytest.raises(DeliveryError, match=r"^mail server refused 1 of 1 recipients: 550"):
             Channel("mail", post.url()).send(alert())
         assert post.inbox.mails == []
+
+    def test_one_of_two_refused(self, post: Post) -> None:
+        post.inbox.refuse = {"b@example.org"}
+        with pytest.raises(DeliveryError, match=r"^only some took it: .*refused 1 of 2 recipients: 550"):
+            Channel("mail", post.url("a@example.org,b@example.org")).send(alert())
 
     def test_server_says_later(self, post: Post) -> None:
         post.inbox.answer = "451 try again later"

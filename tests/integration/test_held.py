@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from alert_support import alert
+from gliderwatch.alerts.smtp import PARTLY
 from gliderwatch.model import Alert, Severity
 from gliderwatch.rules.waiting import QuietHours, Wait
 from gliderwatch.run import metrics
@@ -224,9 +225,9 @@ class TestLookedAt:
 class TestRefused:
     """A channel that refuses for good is one that fails."""
 
-    def refuse(self, rows: Outbox, now: float) -> None:
+    def refuse(self, rows: Outbox, now: float, error: str = "no such user") -> None:
         (row,) = rows.due(now)
-        rows.refused(row.id, "no such user", now, None, [])
+        rows.refused(row.id, error, now, None, [])
 
     def test_it_fails_for_a_day(self, store: Store, rows: Outbox, path: Path) -> None:
         store.post(alert(), ["mail"], NOW)
@@ -243,6 +244,13 @@ class TestRefused:
         assert set(failing(path, NOW + 3)) == {"mail"}, "another channel delivered"
         rows.delivered(mail.id, NOW + 4)
         assert failing(path, NOW + 5) == {}
+
+    def test_but_not_where_others_of_its_addresses_took_it(
+        self, store: Store, rows: Outbox, path: Path
+    ) -> None:
+        store.post(alert(), ["mail"], NOW)
+        self.refuse(rows, NOW + 1, PARTLY + "mail server refused 1 of 2 recipients: 550")
+        assert failing(path, NOW + HOUR) == {}
 
     def test_what_it_refused_is_a_failure_and_no_delivery(
         self, store: Store, rows: Outbox, path: Path

@@ -13,6 +13,9 @@ from gliderwatch.alerts.mail import Envelope, compose
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.model import Alert
 
+PARTLY = "only some took it: "
+"""How the text of a refusal begins where other addresses of the channel took the message."""
+
 
 class DeliveryError(GliderwatchError):
     """A message was not surely delivered. The text holds no secret of the channel's URL.

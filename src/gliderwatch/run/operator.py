@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from gliderwatch.alerts import message
+from gliderwatch.alerts.smtp import PARTLY
 from gliderwatch.alerts.words import duration, utc
 from gliderwatch.config import Config
 from gliderwatch.config.service import Operator as Settings
@@ -124,7 +125,8 @@ def reading(state: Path) -> Iterator[Any]:
 
 def failing(state: Path, now: float) -> dict[str, Failing]:
     """Channels that failed to take a message that still waits, or that refused one for good in the day before
-    `now` (s) and have delivered none since. What is held does not wait before it is due."""
+    `now` (s) and have delivered none since. What is held does not wait before it is due, and a message that
+    some of a channel's addresses took has been told: the report of the refusal names the others."""
     with reading(state) as db:
         since = f"max(a.made_at, {released(db)})"
         sql = (
@@ -132,11 +134,11 @@ def failing(state: Path, now: float) -> dict[str, Failing]:
             f"SELECT o.channel, {since} AS since, o.error FROM outbox o JOIN alerts a ON a.id = o.alert "
             "WHERE o.delivered_at IS NULL AND o.attempts > 0 UNION ALL "
             f"SELECT o.channel, {since} AS since, o.error FROM outbox o JOIN alerts a ON a.id = o.alert "
-            "WHERE o.delivered_at > ? AND o.error LIKE ? || '%' AND NOT EXISTS (SELECT 1 FROM outbox l "
-            "WHERE l.delivered_at > o.delivered_at AND l.channel = o.channel AND l.error = '')) "
-            "GROUP BY channel"
+            "WHERE o.delivered_at > ?1 AND o.error LIKE ?2 || '%' AND o.error NOT LIKE ?2 || ?3 || '%' "
+            "AND NOT EXISTS (SELECT 1 FROM outbox l WHERE l.delivered_at > o.delivered_at "
+            "AND l.channel = o.channel AND l.error = '')) GROUP BY channel"
         )
-        return {row[0]: Failing(*row[1:]) for row in db.execute(sql, (now - DAY, REFUSED))}
+        return {row[0]: Failing(*row[1:]) for row in db.execute(sql, (now - DAY, REFUSED, PARTLY))}
 
 
 def quarantined(state: Path, since: float) -> int:
