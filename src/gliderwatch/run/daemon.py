@@ -186,8 +186,11 @@ class Daemon:
         begun = time.monotonic()
         watcher, settling = self._parts.watcher, self._parts.settling
         watcher.refresh()
+        there = set()
         for found in watcher.scan():
+            there.add(found.path)
             settling.observe(found.path, found.size, found.mtime_ns, time.monotonic())
+        settling.only(there)
         took = time.monotonic() - begun  # where it takes long there is to be time for more than rescans
         self._next_scan = begun + took + max(took, self._parts.config.dockserver.rescan_seconds)
         self._retry = True
