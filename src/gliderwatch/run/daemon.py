@@ -268,7 +268,7 @@ class Daemon:
                     self._store, file, segment, params, speaking, now, self._is_stopping, ocean
                 )
         except Quarantine as error:
-            log.error("file cannot be assessed", path=file.path, exc_info=error.__cause__)
+            log.error("file cannot be assessed", path=file.path, glider=glider, exc_info=error.__cause__)
             self._note(arrivals.failed(file, error))
         else:
             self._told(taken, time.monotonic() - begun)
@@ -345,7 +345,7 @@ class Daemon:
     def _reload(self) -> None:
         """Read the configuration again; a bad one is refused and the old one kept."""
         notify.reloading()
-        before = self._parts
+        before, path = self._parts, str(self._config_path)
         try:
             config = load(self._config_path)
             if Path(config.state.path) != self._state:
@@ -353,10 +353,10 @@ class Daemon:
             heartbeat.url(config)
             parts = build(config, self._news, self._wake, self._workers, before)
         except GliderwatchError as error:
-            log.error("configuration refused, the old one is kept", reason=str(error))
+            log.error("configuration refused, the old one is kept", path=path, reason=str(error))
         else:
             before.stop(parts)
             self._use(parts)
             parts.start(before)
-            log.info("configuration read again", gliders=sorted(config.gliders))
+            log.info("configuration read again", path=path, gliders=sorted(config.gliders))
         notify.notify("READY=1")
