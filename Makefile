@@ -4,8 +4,9 @@ PYTHON ?= python3
 # Wheels only, so that nothing is compiled behind your back. dbdreader has none for CPython 3.14
 # and for ARM: there, `make test WHEELS=` builds that one from source.
 WHEELS ?= --only-binary :all:
-# pytest processes; tests marked `timing` always run alone.
-JOBS ?= 2
+# pytest processes: one more than the cores of a small machine, as many tests wait for what is due. Those
+# marked `timing` always run alone.
+JOBS ?= 3
 UV_VERSION := 0.13.9
 CYCLONEDX_VERSION := 7.5.0
 
@@ -36,7 +37,7 @@ install: $(VENV)/installed ## install gliderwatch and its tools into .venv, from
 test: $(VENV)/installed ## run all tests; those that measure time first and alone
 	@mkdir -p build; rm -f build/tests-*.xml; failed=0; \
 	$(BIN)/python -m pytest -m timing --junit-xml=build/tests-timing.xml || [ $$? -eq 5 ] || failed=1; \
-	$(BIN)/python -m pytest -m "not timing" -n $(JOBS) --junit-xml=build/tests-main.xml || failed=1; \
+	$(BIN)/python -m pytest -m "not timing" -n $(JOBS) --dist worksteal --junit-xml=build/tests-main.xml || failed=1; \
 	exit $$failed
 
 demo: $(VENV)/installed ## a small dockserver, a faulty glider, the daemon, and the alert as it arrives

@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -237,6 +237,20 @@ def results(state: Path) -> dict[str, tuple[list[Assessment], list[Incident]]]:
 
 # --------------------------------------------------------------------------- daemon
 
+_FLIGHT_DATA = re.compile(r"/from-glider/[^/\s]+\.[smd][bc]d\b")
+
+
+def lacks_key(entry: Mapping[str, Any], gliders: Iterable[str]) -> str | None:
+    """The key that a line of the log lacks, by which one would look for it; None: it has all."""
+    about = str(entry.get("alert", "")).partition("/")[0]
+    wanted = {
+        "path": entry["event"].startswith("file ") or _FLIGHT_DATA.search(str(entry.get("reason", ""))),
+        "glider": entry["event"].startswith("file ") or about in gliders,
+        "alert": entry["event"].startswith("alert"),
+        "channel": entry["event"].startswith("alert "),
+    }
+    return next((key for key, is_wanted in wanted.items() if is_wanted and key not in entry), None)
+
 
 class Daemon:
     """The service as a process. Its log goes to a file, which lives on from start to start."""
@@ -251,10 +265,13 @@ class Daemon:
     def __enter__(self) -> Daemon:
         return self.start().ready()
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None = None, *_: object) -> None:
         if self.process is not None:
             self.process.kill()
             self.process.wait()
+        if kind is None:
+            gliders = {folder.name for folder in self.site.root.glob("*")}
+            assert [e for e in self.log(".*") if lacks_key(e, gliders)] == []
 
     def start(self) -> Daemon:
         """Start it; `ready` waits until it watches."""

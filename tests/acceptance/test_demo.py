@@ -1,4 +1,4 @@
-"""The demo does what it promises, and leaves nothing behind."""
+"""The demo does what it promises, and leaves nothing behind; five times as fast as for people who look on."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ import subprocess
 import sys
 from pathlib import Path
 
-DEMO = Path(__file__).resolve().parents[2] / "demo" / "demo.py"
+DEMO = Path(__file__).resolve().parents[2] / "demo"
+FAST = "import sys, demo; demo.SPEEDUP *= 5; sys.exit(demo.main())"
 
 
 def test_the_demo_ends_with_the_alert_and_leaves_nothing(tmp_path: Path) -> None:
     result = subprocess.run(
-        [sys.executable, DEMO],
-        env=os.environ | {"TMPDIR": str(tmp_path)},
+        [sys.executable, "-c", FAST],
+        env=os.environ | {"TMPDIR": str(tmp_path), "PYTHONPATH": str(DEMO), "PYTHONDONTWRITEBYTECODE": "1"},
         capture_output=True,
         text=True,
         check=False,

@@ -126,7 +126,7 @@ def test_a_state_that_becomes_read_only_is_said_and_no_sign_of_life_given(site: 
     switch = site.config.with_name("switch")
     with mail_server() as box:
         site.configure("angus", url=box.url, surfacing=["angus"])
-        with Daemon(site, **hooked(CHAOS_STATE=switch)) as daemon:
+        with Daemon(site, WATCHDOG_USEC="2000000", **hooked(CHAOS_STATE=switch)) as daemon:  # a beat a second
             put(site, *EARLY)
             taken(site, *EARLY)
             until(lambda: box.mails and site.undelivered() == 0, "first mail")
@@ -134,9 +134,9 @@ def test_a_state_that_becomes_read_only_is_said_and_no_sign_of_life_given(site: 
             put(site, *LATE)
             until(lambda: told(daemon), "it says so")
             since = time.monotonic()
-            until(lambda: time.monotonic() - since > 11.0, "longer than a beat")
+            until(lambda: time.monotonic() - since > 3.0, "longer than a beat")
             still = silence(site.state)
-            assert still is not None and still > 10.0
+            assert still is not None and still > 2.9
             assert site.statuses(*(f.name for f in LATE)) == [None] * len(LATE)
             switch.write_text("", encoding="utf-8")
             taken(site, *FILES)

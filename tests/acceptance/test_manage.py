@@ -39,6 +39,11 @@ def put(site: Site, *some: Arrival) -> None:
     """Let files arrive and wait until they are taken."""
     for file in some:
         site.put("bruce", file.name, file.data)
+    taken(site, *some)
+
+
+def taken(site: Site, *some: Arrival) -> None:
+    """Wait until files are taken."""
     wanted = [Status.TAKEN] * len(some)
     until(lambda: site.statuses(*(f.name for f in some)) == wanted, "taken")
 
@@ -157,7 +162,7 @@ def test_a_copy_is_made_while_the_service_writes_and_can_be_gone_on_from(site: S
         made = command("backup", target, "-c", site.config)
         assert made.returncode == 0, made.stderr
         assert "whole" in made.stdout
-        put(site, *files())
+        taken(site, *files())
         whole = results(site.state)
         daemon.stop()
     assert command("backup", target, "-c", site.config).returncode == 2

@@ -83,7 +83,7 @@ def test_numbers_tell_what_happened(site: Site, free_port: int) -> None:
     with mail_server() as box:
         site.configure("angus", url=box.url, surfacing=["angus"])
         configure(site, metrics={"port": free_port})
-        with Daemon(site) as daemon:
+        with Daemon(site, WATCHDOG_USEC="1000000") as daemon:  # a beat each half second
             put(site, *FILES)
             site.put("angus", "angus-2024-122-0-99.sbd", b"no flight data\n")
             taken(site, *FILES)

@@ -187,3 +187,17 @@ def test_a_file_that_grew_without_news_before_it_was_looked_at_settles_anew(loop
     path.write_bytes(WHOLE)
     loop.until(lambda: loop.hand.held)
     assert time.monotonic() > grown + 0.9, "taken as it was a second ago"
+
+
+def test_a_file_that_is_gone_is_not_remembered_for_ever(loop: Loop) -> None:
+    """Else a service of years would keep the name of each file that the dockserver has cleared away."""
+    path = loop.put(WHOLE, 1_000)
+    loop.until(lambda: loop.hand.held)
+    loop.hand.let_go(loop.hand.read())
+    loop.until(loop.is_taken)
+    settling = loop.daemon._parts.settling
+    loop.daemon._scan()
+    assert settling.passed(path) is not None
+    path.unlink()
+    loop.daemon._scan()
+    assert settling.passed(path) is None

@@ -130,8 +130,21 @@ def test_the_journal_gets_one_line_an_event_and_all_of_the_name(journal: io.Stri
     lines = journal.getvalue().splitlines()
     assert len(lines) == 5
     assert all(line.isprintable() for line in lines)
-    entry = json.loads(lines[0])
-    assert (entry["path"], entry["event"]) == (PATH, "file quarantined")
+    entries = [json.loads(line) for line in lines]
+    assert (entries[0]["path"], entries[0]["event"]) == (PATH, "file quarantined")
+    library = entries[-1]
+    assert (library["logger"], library["level"]) == ("watchdog", "warning")
+    assert PATH in library["event"] and library["timestamp"]
+
+
+def test_an_error_in_a_library_is_one_line_of_the_journal(journal: io.StringIO) -> None:
+    try:
+        raise ValueError(NASTY)
+    except ValueError:
+        logging.getLogger("watchdog").exception("unforeseen")
+    (line,) = journal.getvalue().splitlines()
+    assert json.loads(line)["event"] == "unforeseen"
+    assert "raise ValueError(NASTY)" in json.loads(line)["exception"]
 
 
 def test_a_name_that_is_no_text_can_be_logged(terminal: io.StringIO) -> None:

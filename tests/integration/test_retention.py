@@ -1,7 +1,6 @@
 """What is old is removed: never what is open, what is to be told, or what a late file still needs."""
 
 import shutil
-import sqlite3
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -227,23 +226,53 @@ def stopped_in(store: Store, n: int) -> bool:
     return True
 
 
-def test_the_room_is_given_back(store, path):
+def fill(store: Store) -> None:
+    """Make the greater part of the file free pages."""
     store._db.execute("CREATE TABLE filling (data BLOB)")
     store._db.execute("INSERT INTO filling VALUES (zeroblob(20000000))")
     store._db.execute("DROP TABLE filling")
+    assert store._db.execute("PRAGMA freelist_count").fetchone()[0] > 3000
+
+
+def compact(store: Store) -> int:
+    """Remove nothing, but give room back; in how many steps beside the one through the ledger."""
+    steps = len(list(retention.remove(store._db, store.transaction, (), 0.0))) - 1
+    assert store._db.execute("PRAGMA freelist_count").fetchone()[0] == 0
+    assert store._db.execute("PRAGMA page_count").fetchone()[0] < 2000
+    return steps
+
+
+def test_the_room_is_given_back_page_by_page(store, path, monkeypatch):
+    """However large the file is: this takes no longer at a time than any other step."""
+    monkeypatch.setattr(retention, "_LARGEST", 0.0)
     before = content(store)
-    for row in range(2):  # the first time it is written anew, from then on page by page
-        assert store._db.execute("PRAGMA freelist_count").fetchone()[0] > 3000
-        list(retention.remove(store._db, store.transaction, (), 0.0))
-        assert store._db.execute("PRAGMA freelist_count").fetchone()[0] == 0
-        assert store._db.execute("PRAGMA page_count").fetchone()[0] < 2000
-        if row == 0:
-            store._db.execute("CREATE TABLE filling (data BLOB)")
-            store._db.execute("INSERT INTO filling VALUES (zeroblob(20000000))")
-            store._db.execute("DROP TABLE filling")
+    fill(store)
+    store._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    large = path.stat().st_size
+    assert compact(store) > 3
+    store._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    assert path.stat().st_size < large - 19e6
     assert content(store) == before
-    with sqlite3.connect(path) as db:
-        assert db.execute("PRAGMA integrity_check").fetchone()[0] == "ok"
+    assert damage(path) is None
+
+
+def test_a_file_of_an_earlier_making_is_written_anew_where_that_is_cheap(store, path, monkeypatch):
+    store._db.executescript("PRAGMA journal_mode = DELETE; PRAGMA auto_vacuum = NONE; VACUUM")
+    store.close()
+    store = Store.open(path)
+    assert store._db.execute("PRAGMA auto_vacuum").fetchone()[0] == 0
+    before = content(store)
+    fill(store)
+    with monkeypatch.context() as small:
+        small.setattr(retention, "_LARGEST", 0.0)
+        list(retention.remove(store._db, store.transaction, (), 0.0))
+        assert store._db.execute("PRAGMA freelist_count").fetchone()[0] > 3000
+    assert compact(store) == 1
+    fill(store)
+    assert compact(store) > 3  # from then on page by page
+    assert content(store) == before
+    store.close()
+    assert damage(path) is None
 
 
 class TestDaily:

@@ -198,6 +198,14 @@ def log_events() -> set[str]:
     return events
 
 
+def test_benchmarks_are_run_as_their_page_says() -> None:
+    told = re.findall(r"`(?:benchmarks/)?(\w+\.py)((?: [^`]*)?)`", text("benchmarks/README.md"))
+    assert len(told) > 10
+    for script, arguments in told:
+        code = text(f"benchmarks/{script}")
+        assert all(f'"{flag}"' in code for flag in re.findall(r"--[a-z-]+", arguments)), (script, arguments)
+
+
 def test_events_of_the_log_are_described() -> None:
     rows = re.findall(
         r"^\| ((?:`[^`]+`(?:, )?)+) \| (?:info|warning|error) \|", text("docs/operations.md"), re.M

@@ -257,6 +257,11 @@ def test_files_that_are_no_use_are_named(examined: Doctor, tree: Path) -> None:
         (("m_present_time",), Level.ERROR, ("m_present_time", "nothing can be assessed")),
         (("m_gps_lon",), Level.ERROR, ("m_gps_lon", "nothing can be assessed")),
         (("m_water_vx", "m_water_vy"), Level.WARNING, ("m_water_vx or m_initial_water_vx", "flag 2")),
+        (("m_water_vy",), Level.WARNING, ("m_water_vy or m_initial_water_vy (no current", "flag 2")),
+        (("m_depth",), Level.WARNING, ("m_depth (drift is told from flight by pitch alone",)),
+        (("m_pitch",), Level.WARNING, ("m_pitch (no asymmetry",)),
+        (("m_roll",), Level.WARNING, ("m_roll (no sign of a lost wing",)),
+        (("m_lon",), Level.NOTE, ("m_lon (the way of a dive",)),
         (("m_heading",), Level.ERROR, ("m_heading or c_heading",)),
         (("m_depth", "m_roll"), Level.WARNING, ("m_depth", "m_roll")),
         (("m_gps_mag_var",), Level.NOTE, ("m_gps_mag_var", "World Magnetic Model")),
@@ -271,6 +276,22 @@ def test_sensors_that_are_left_out(
     assert "electa-2026-1-0-0" in found[0].text
     assert all(part in found[0].text for part in parts)
     assert "sbdlist" in found[0].cure
+
+
+@pytest.mark.real
+def test_sensors_that_a_real_glider_leaves_out(shared_data: Path, tmp_path: Path) -> None:
+    """Depth, pitch, roll and current are in its files: of these nothing is said."""
+    mission = shared_data / "maria-2022"
+    folders = f"{{roots: [{mission}], cache: [{mission / 'cache'}]}}"
+    glider = f"{{maria-997: {{paths: [{mission / 'from-glider'}]}}}}"
+    config = tmp_path / "c.yml"
+    config.write_text(f"dockserver: {folders}\nstate: {{path: s.sqlite}}\ngliders: {glider}\n")
+    (told,) = (f.text for f in doctor.examine(config) if f.topic == "sensors")
+    assert told == (
+        "maria-997 (maria-997-2022-165-0-36) lacks m_final_water_vx, m_final_water_vy (the current of a dive "
+        "stays provisional until the next file); m_gps_mag_var (declination from the World Magnetic Model); "
+        "m_avg_speed or m_speed (no speed of the glider's own to compare with)"
+    )
 
 
 def test_the_newest_sbd_tells_the_sensors(examined: Doctor, tree: Path) -> None:

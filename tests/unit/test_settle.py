@@ -68,6 +68,19 @@ def test_what_is_forgotten_does_not_pass_and_may_pass_again(settling):
     assert settling.ready(1.0) == [LONG]
 
 
+def test_what_is_there_no_more_is_forgotten_though_not_what_still_waits(settling):
+    settling.observe(LONG, 100, 1, now=0.0)
+    settling.ready(0.0)
+    settling.observe(SHORT, 100, 1, now=0.0)
+    settling.only({LONG})
+    assert settling.passed(LONG) == (100, 1)
+    settling.only(set())
+    assert settling.passed(LONG) is None
+    assert settling.ready(20.0) == [SHORT]
+    settling.observe(LONG, 100, 1, now=21.0)
+    assert settling.ready(21.0) == [LONG]
+
+
 def test_nothing_waits_in_the_beginning(settling):
     assert settling.next_deadline(0.0) is None
     assert settling.ready(0.0) == []

@@ -8,7 +8,7 @@ import pytest
 from gliderwatch.simulate.flight import Airframe, steady_glide
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.ocean import Constituent, Ellipse, Sea, make_ocean
-from gliderwatch.simulate.onboard import Point, displacement, nmea, offset, own_speed
+from gliderwatch.simulate.onboard import Point, displacement, nmea, offset, own_speed, written
 from gliderwatch.simulate.scenario import FixIn, Scenario
 from simulated import DAY, EVERY_CYCLE, STRAIGHT, closures, degrees, samples
 
@@ -205,6 +205,12 @@ def test_offset_and_displacement_agree_with_a_known_geodesic() -> None:
 
 def test_nmea_positions() -> None:
     np.testing.assert_allclose(nmea(np.array([38.727, -62.3259, 0.5])), [3843.62, -6219.554, 30.0])
+
+
+@pytest.mark.parametrize("degrees", [1.99999999999, -1.99999999999, -0.99999999999, 179.9999999999])
+def test_a_fix_is_never_written_with_sixty_minutes(degrees: float) -> None:
+    """Readers drop it, as they do what is no position."""
+    assert float(written(np.array(degrees))) == 100 * round(degrees)
 
 
 def test_an_ellipse_has_its_axes_and_turns_its_way() -> None:

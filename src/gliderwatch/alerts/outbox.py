@@ -185,7 +185,7 @@ class Dispatcher:
             if worker is None:
                 error = "the configuration has no such channel any more: kept until it is there again"
                 store.park(row.id, error)
-                log.warning("alert parked", alert=row.alert.id, channel=row.channel, reason=error)
+                log.warning("alert parked", **_about(row), reason=error)
             elif worker.row is None:
                 self._waiting.pop(row.id, None)
                 worker.give(row)
@@ -198,7 +198,7 @@ class Dispatcher:
             store.delivered(row.id, self._clock())
             self._waiting.pop(row.id, None)
             seconds = round(result.seconds, 3)
-            log.info("alert delivered", alert=row.alert.id, channel=row.channel, seconds=seconds)
+            log.info("alert delivered", **_about(row), seconds=seconds)
         elif result.refused:
             self._refused(store, row, result.error)
         elif worker.row is not None:  # else its row was given up before, and counted
@@ -223,7 +223,7 @@ class Dispatcher:
         report = None if is_report or not others else _report_of(row, error, now)
         store.refused(row.id, error, now, report, others)
         self._waiting.pop(row.id, None)
-        log.error("alert refused for good", alert=row.alert.id, channel=row.channel, error=error)
+        log.error("alert refused for good", **_about(row), error=error)
         if report is not None:
             self._wake.set()
 
@@ -233,8 +233,7 @@ class Dispatcher:
         self._waiting[row.id] = self._clock() + delay
         log.warning(
             "alert not delivered",
-            alert=row.alert.id,
-            channel=row.channel,
+            **_about(row),
             error=error,
             attempts=row.attempts + 1,
             retry_in=round(delay, 1),
@@ -257,6 +256,12 @@ def _report_of(row: OutboxRow, error: str, now: float) -> Alert:
         severity=Severity.WARNING,
         audience=Severity.WARNING,
     )
+
+
+def _about(row: OutboxRow) -> dict[str, str]:
+    """The keys of a line about a message on its way; one to the operator is about no glider."""
+    glider = {"glider": row.alert.glider} if row.alert.glider else {}
+    return {"alert": row.alert.id, "channel": row.channel, **glider}
 
 
 def _close(store: OutboxStore | None) -> None:

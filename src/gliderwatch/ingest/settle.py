@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -54,6 +55,10 @@ class Settling:
         """Knows nothing of a file any more: it is gone, or is to be let pass once more."""
         self._waiting.pop(path, None)
         self._passed.pop(path, None)
+
+    def only(self, there: Container[Path]) -> None:
+        """Forgets the files that passed and are not `there` any more; one that comes back passes again."""
+        self._passed = {path: state for path, state in self._passed.items() if path in there}
 
     def next_deadline(self, now: float) -> float | None:
         """Seconds from `now` until the next file may be complete; None when none waits."""

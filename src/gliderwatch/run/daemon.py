@@ -191,8 +191,11 @@ class Daemon:
         begun = time.monotonic()
         watcher, settling = self._parts.watcher, self._parts.settling
         watcher.refresh()
+        there = set()
         for found in watcher.scan():
+            there.add(found.path)
             settling.observe(found.path, found.size, found.mtime_ns, time.monotonic())
+        settling.only(there)
         took = time.monotonic() - begun  # where it takes long there is to be time for more than rescans
         self._next_scan = begun + took + max(took, self._parts.config.dockserver.rescan_seconds)
         self._retry = True
@@ -270,7 +273,7 @@ class Daemon:
                     self._store, file, segment, params, speaking, now, self._is_stopping, ocean
                 )
         except Quarantine as error:
-            log.error("file cannot be assessed", path=file.path, exc_info=error.__cause__)
+            log.error("file cannot be assessed", path=file.path, glider=glider, exc_info=error.__cause__)
             self._note(arrivals.failed(file, error))
         else:
             self._told(taken, time.monotonic() - begun)
@@ -347,7 +350,7 @@ class Daemon:
     def _reload(self) -> None:
         """Read the configuration again; a bad one is refused and the old one kept."""
         notify.reloading()
-        before = self._parts
+        before, path = self._parts, str(self._config_path)
         try:
             config = load(self._config_path)
             if Path(config.state.path) != self._state:
@@ -355,10 +358,10 @@ class Daemon:
             heartbeat.url(config)
             parts = build(config, self._news, self._wake, self._workers, before)
         except GliderwatchError as error:
-            log.error("configuration refused, the old one is kept", reason=str(error))
+            log.error("configuration refused, the old one is kept", path=path, reason=str(error))
         else:
             before.stop(parts)
             self._use(parts)
             parts.start(before)
-            log.info("configuration read again", gliders=sorted(config.gliders))
+            log.info("configuration read again", path=path, gliders=sorted(config.gliders))
         notify.notify("READY=1")

@@ -103,7 +103,7 @@ class Heartbeat:
             try:
                 self._file.touch()
             except OSError as error:
-                log.warning("heartbeat not given", file=str(self._file), reason=error.strerror)
+                log.warning("heartbeat not given", path=str(self._file), reason=error.strerror)
         if self._url is not None:
             reason = fetch(self._url)
             if reason:

@@ -39,22 +39,25 @@ class _Patient(io.TextIOBase):
 
 def configure() -> None:
     """Set up structlog and the log of the libraries, which is heard from warnings on."""
+    is_terminal, json = sys.stderr.isatty(), structlog.processors.JSONRenderer()
+    common: list[structlog.typing.Processor] = [
+        structlog.contextvars.merge_contextvars,
+        structlog.processors.add_log_level,
+        structlog.processors.TimeStamper(fmt="iso", utc=True),
+        structlog.processors.format_exc_info,
+    ]
     heard = logging.StreamHandler(sys.stderr)
-    heard.setFormatter(_OneLine("%(name)s: %(message)s"))
-    logging.basicConfig(level=logging.WARNING, handlers=[heard])
-    renderer: list[structlog.typing.Processor] = (
-        [_printable, structlog.dev.ConsoleRenderer()]
-        if sys.stderr.isatty()
-        else [structlog.processors.JSONRenderer()]
+    heard.setFormatter(
+        _OneLine("%(name)s: %(message)s")
+        if is_terminal
+        else structlog.stdlib.ProcessorFormatter(
+            processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, json],
+            foreign_pre_chain=[structlog.stdlib.add_logger_name, *common],
+        )
     )
+    logging.basicConfig(level=logging.WARNING, handlers=[heard])
     structlog.configure(
-        processors=[
-            structlog.contextvars.merge_contextvars,
-            structlog.processors.add_log_level,
-            structlog.processors.TimeStamper(fmt="iso", utc=True),
-            structlog.processors.format_exc_info,
-            *renderer,
-        ],
+        processors=[*common, *([_printable, structlog.dev.ConsoleRenderer()] if is_terminal else [json])],
         wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
         logger_factory=structlog.WriteLoggerFactory(file=cast(TextIO, _Patient(sys.stderr))),
         cache_logger_on_first_use=True,
@@ -97,4 +100,5 @@ def taken(input_: Taken) -> None:
 def alerts(made: Iterable[Alert]) -> None:
     """Messages that are on their way."""
     for alert in made:
-        log.warning("alert", glider=alert.glider, kind=str(alert.kind), alert=alert.id, title=alert.title)
+        glider = {"glider": alert.glider} if alert.glider else {}  # else it is for the operator
+        log.warning("alert", alert=alert.id, **glider, kind=str(alert.kind), title=alert.title)

@@ -38,7 +38,11 @@ class Ocean:
         try:
             return read_field(ocean.files, area, ocean.stale_hours * 3600)
         except GliderwatchError as error:
-            log.warning("ocean model cannot be read: dives get no reference flow", reason=str(error))
+            log.warning(
+                "ocean model cannot be read: dives get no reference flow",
+                paths=list(ocean.files),
+                reason=str(error),
+            )
             return None
 
 

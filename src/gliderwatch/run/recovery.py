@@ -39,7 +39,12 @@ def open_state(config: Config) -> Store:
 def set_aside(path: Path, reason: str) -> None:
     """Put a damaged state file out of the way. Raises StateError where it cannot be renamed."""
     aside = damage.set_aside(path, time.time())
-    log.error("state file is damaged, set aside, made anew from the files", reason=reason, kept=str(aside))
+    log.error(
+        "state file is damaged, set aside, made anew from the files",
+        path=str(path),
+        reason=reason,
+        kept=str(aside),
+    )
 
 
 def _tell(aside: Path, config: Config) -> None:

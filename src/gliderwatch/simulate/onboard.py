@@ -93,3 +93,14 @@ def nmea(degrees: Array) -> Array:
     """
     whole = np.trunc(degrees)
     return np.asarray(100 * whole + 60 * (degrees - whole))
+
+
+def written(degrees: Array) -> Array:
+    """As `nmea`, with the four decimals that gliders send of a fix; 60 minutes are the next degree.
+
+    >>> written(np.array([-27.51, -1.9999999999])).tolist()
+    [-2730.6, -200.0]
+    """
+    value = np.round(nmea(degrees), 4)
+    next_degree = 100 * np.round(np.asarray(degrees))
+    return np.asarray(np.where(np.abs(value) % 100 < 60, value, next_degree))

@@ -9,7 +9,7 @@ import numpy as np
 
 from gliderwatch.simulate.fixes import Fixes, Plan, drift, heard, make_plan, seen_drift
 from gliderwatch.simulate.instruments import DR_AWAITING_DIVE, DR_AWAITING_FIX, DR_AWAITING_POSTFIX
-from gliderwatch.simulate.onboard import Vector, displacement, nmea, turn
+from gliderwatch.simulate.onboard import Vector, displacement, turn, written
 from gliderwatch.simulate.scenario import DiveTruth
 from gliderwatch.simulate.telemetry import CYCLE, SCIENCE_CYCLE
 from gliderwatch.simulate.vehicle import Flown, Glider
@@ -94,9 +94,9 @@ def _log(glider: Glider, plan: Plan, fixes: Fixes, known: Fixes) -> None:
         for opened in files:
             i = int(np.searchsorted(fixes.cycles, opened)) - 1
             repeated = reported[i] if i >= 0 else old
-            log.add(f"m_gps_{name}", opened, np.round(nmea(np.asarray(repeated)), 4))
-        log.add(f"m_gps_{name}", fixes.cycles, np.round(nmea(reported), 4))
-        log.add(f"m_{name}", fixes.cycles[fresh], np.round(nmea(values[fresh]), 4))
+            log.add(f"m_gps_{name}", opened, written(np.asarray(repeated)))
+        log.add(f"m_gps_{name}", fixes.cycles, written(reported))
+        log.add(f"m_{name}", fixes.cycles[fresh], written(values[fresh]))
     place = glider.to_lmc(known.point(-1))
     log.add("m_x_lmc", known.cycles[-1], place.east)
     log.add("m_y_lmc", known.cycles[-1], place.north)

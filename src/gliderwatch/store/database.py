@@ -113,6 +113,8 @@ def connect(path: Path | str, *, durable: bool = True) -> sqlite3.Connection:
     with guarded(path):
         connection = sqlite3.connect(path, timeout=30.0, isolation_level=None, check_same_thread=False)
         try:
+            if connection.execute("PRAGMA page_count").fetchone()[0] == 0:  # of no effect after the next line
+                connection.execute("PRAGMA auto_vacuum = INCREMENTAL")
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute(f"PRAGMA synchronous = {'FULL' if durable else 'OFF'}")
             connection.execute("PRAGMA foreign_keys = ON")

@@ -25,6 +25,9 @@ _LIST_BYTES = 4 * 1024 * 1024
 _SHOWN = 8
 
 _ALL_LOST = "nothing can be assessed"
+_NO_CURRENT = "no current of the glider's own: slower and less sure, no flag 2"
+_PROVISIONAL = "the current of a dive stays provisional until the next file"
+_NO_WAY = "the way of a dive is put together from heading alone"
 NEEDED = {
     ("m_present_time",): _ALL_LOST,
     ("m_gps_lat",): _ALL_LOST,
@@ -34,19 +37,19 @@ NEEDED = {
 """Without them there is no assessment; one of each is enough."""
 WANTED = {
     ("m_heading",): "the commanded heading stands in; a compass fault goes unseen",
-    ("m_water_vx", "m_initial_water_vx"): "no current of the glider's own: slower and less sure, no flag 2",
-    ("m_water_vy", "m_initial_water_vy"): "as m_water_vx",
+    ("m_water_vx", "m_initial_water_vx"): _NO_CURRENT,
+    ("m_water_vy", "m_initial_water_vy"): _NO_CURRENT,
     ("m_depth",): "drift is told from flight by pitch alone; no rate of dive and climb",
     ("m_pitch",): "no asymmetry of dive and climb; drift is told by depth alone",
     ("m_roll",): "no sign of a lost wing or of what hangs on one side",
 }
 """Without them faults are found later, or taken for another; one of each is enough."""
 USEFUL = {
-    ("m_final_water_vx",): "the current of a dive stays provisional until the next file",
-    ("m_final_water_vy",): "as m_final_water_vx",
+    ("m_final_water_vx",): _PROVISIONAL,
+    ("m_final_water_vy",): _PROVISIONAL,
     ("m_gps_mag_var",): "declination from the World Magnetic Model",
-    ("m_lat",): "the way of a dive is put together from heading alone",
-    ("m_lon",): "as m_lat",
+    ("m_lat",): _NO_WAY,
+    ("m_lon",): _NO_WAY,
     ("m_avg_speed", "m_speed"): "no speed of the glider's own to compare with",
     ("m_ballast_pumped", "m_de_oil_vol"): "new ballast can be taken for a fault",
 }
@@ -162,4 +165,7 @@ def _lacking(rows: dict[tuple[str, ...], str], held: set[str]) -> Iterator[tuple
 
 
 def _losses(lost: list[tuple[str, str]]) -> str:
-    return "; ".join(f"{sensor} ({loss})" for sensor, loss in lost)
+    by_loss: defaultdict[str, list[str]] = defaultdict(list)
+    for sensor, loss in lost:
+        by_loss[loss].append(sensor)
+    return "; ".join(f"{', '.join(sensors)} ({loss})" for loss, sensors in by_loss.items())
