@@ -6,6 +6,9 @@ PYTHON ?= python3
 WHEELS ?= --only-binary :all:
 # pytest processes; tests marked `timing` always run alone.
 JOBS ?= 2
+# Of `make chaos`: how long it takes, and what all its moments follow from.
+MINUTES ?= 30
+SEED ?= 1
 UV_VERSION := 0.13.9
 CYCLONEDX_VERSION := 7.5.0
 
@@ -15,7 +18,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 WHEELHOUSE := dist/wheelhouse
 
 .DEFAULT_GOAL := help
-.PHONY: help install test demo lint format types contracts docs audit sbom wheelhouse lock clean
+.PHONY: help install test chaos demo lint format types contracts docs audit sbom wheelhouse lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -38,6 +41,9 @@ test: $(VENV)/installed ## run all tests; those that measure time first and alon
 	$(BIN)/python -m pytest -m timing --junit-xml=build/tests-timing.xml || [ $$? -eq 5 ] || failed=1; \
 	$(BIN)/python -m pytest -m "not timing" -n $(JOBS) --junit-xml=build/tests-main.xml || failed=1; \
 	exit $$failed
+
+chaos: $(VENV)/installed ## half an hour of faults at random moments, then a comparison with an undisturbed replay
+	$(BIN)/python benchmarks/chaos.py --minutes $(MINUTES) --seed $(SEED)
 
 demo: $(VENV)/installed ## a small dockserver, a faulty glider, the daemon, and the alert as it arrives
 	$(BIN)/python demo/demo.py
