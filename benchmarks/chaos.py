@@ -125,7 +125,11 @@ def _left(storm: Storm) -> list[str]:
 
 
 def _report(storm: Storm, enemy: Enemy, vitals: Vitals) -> None:
-    tally, pss, files = storm.tally, vitals.pss, vitals.open_files
+    tally, pss, files = (
+        storm.tally,
+        vitals.pss,
+        {when: len(files) for when, files in vitals.open_files.items()},
+    )
     rows: Counter[str] = Counter()
     for where, n in tally.kills.items():
         rows[f"SIGKILL {where.rstrip(' 0123456789')}"] += n

@@ -19,6 +19,8 @@ from gliderwatch.store.damage import asides
 _PAGE = 4096
 _DAY = 86400.0
 _SALVO = 10
+_DAMAGE = 0.35
+"""The part of the time after which the state is damaged no more: what is made anew hides what was lost."""
 
 
 class Faults:
@@ -166,7 +168,7 @@ class Faults:
 
     def _damaged(self, harm: Callable[[Path], None]) -> Lane:
         """While the daemon is down; what was set aside before and is told is deleted."""
-        if self.storm.is_calm():
+        if self.storm.part() > _DAMAGE:
             raise SparedError
         yield from self._ready()
         with self.storm.excused():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import heapq
-import json
 import signal
 import sys
 import time
@@ -13,10 +12,12 @@ from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
 
+import logbook
+
 from acceptance.chaos import Chaos, hooked
 from acceptance.disk import Disk
 from acceptance.hostile import program
-from acceptance.support import TRACEBACK, Mailbox, Site, until
+from acceptance.support import Mailbox, Site, until
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Fault, FaultKind, Mission, Scenario
 
@@ -289,11 +290,5 @@ class Storm(Chaos):
 
     def complaints(self) -> list[str]:
         """What is wrong so far."""
-        text = self.daemon.text()
         found = [*self.wrong, *(f"a copy of the state is broken: {text}" for text in self.tally.broken)]
-        if TRACEBACK in text:
-            found.append("a traceback in the log")
-        bad = ("file cannot be assessed", "ended by an error")
-        entries = (json.loads(line) for line in text.splitlines() if any(event in line for event in bad))
-        found += [f"in the log: {entry}" for entry in entries if entry["event"] in bad]
-        return found
+        return found + logbook.complaints(self.daemon.text())
