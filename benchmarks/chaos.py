@@ -97,8 +97,8 @@ def _lanes(storm: Storm, enemy: Enemy, vitals: Vitals, sinks: Sinks) -> list[Lan
         storm.lane(5, 20, faults.clocks()),
         storm.lane(3, 12, faults.copies()),
         storm.lane(5, 15, enemy.kinds()),
-        storm.lane(5, 20, sinks.kinds(pilot)),
-        storm.lane(5, 20, [*sinks.kinds(boat), sinks.for_good(boat)]),
+        storm.lane(10, 30, sinks.kinds(pilot)),
+        storm.lane(10, 30, [*sinks.kinds(boat), sinks.for_good(boat)]),
         vitals.lane(),
         _progress(storm),
     ]

@@ -9,7 +9,7 @@ from acceptance.support import TRACEBACK
 
 _EVENTS = ("file cannot be assessed", "ended by an error")
 _CUT_OFF = ("EOFError", "_pickle.UnpicklingError")
-"""How Python itself, in `spawn_main`, ends the start of a worker whose daemon is killed in the middle of it."""
+"""How Python itself, in `spawn_main`, ends the start of a worker whose daemon is killed meanwhile."""
 
 
 def complaints(text: str) -> list[str]:

@@ -11,6 +11,9 @@ from storm import Kind, Lane, Storm
 
 from acceptance.support import Mailbox, mail_server
 
+_LASTS = (4.0, 12.0)
+"""Seconds that a mood lasts: often shorter than until the next try, or the delays would grow to minutes."""
+
 
 class Moody(Mailbox):
     """The handler of a mail server that does what its ``mood`` is."""
@@ -31,7 +34,7 @@ class Moody(Mailbox):
         if self.mood == "for good":
             return "550 5.7.1 refused"
         if self.mood == "slow":
-            await asyncio.sleep(3.0)
+            await asyncio.sleep(2.0)
         return await Mailbox.handle_DATA(self, *arguments)
 
 
@@ -45,7 +48,7 @@ class Sinks:
         """What can be wrong with a channel but a refusal for good."""
         return [
             (f"{channel}: server away, connections refused", lambda: self._away(channel)),
-            (f"{channel}: server slow, 3 s a mail", lambda: self._mood(channel, "slow")),
+            (f"{channel}: server slow, 2 s a mail", lambda: self._mood(channel, "slow")),
             (f"{channel}: 451, greylisted", lambda: self._mood(channel, "greylisting")),
             (f"{channel}: 451, refused for now", lambda: self._refusing(channel)),
         ]
@@ -58,7 +61,7 @@ class Sinks:
         box = self._boxes[channel]
         box.mood = mood
         try:
-            yield self.storm.chance.uniform(4.0, 20.0)
+            yield self.storm.chance.uniform(*_LASTS)
         finally:
             box.mood = ""
 
@@ -66,7 +69,7 @@ class Sinks:
         box = self._boxes[channel]
         box.refusing = True
         try:
-            yield self.storm.chance.uniform(4.0, 20.0)
+            yield self.storm.chance.uniform(*_LASTS)
         finally:
             box.refusing = False
 
@@ -74,7 +77,8 @@ class Sinks:
         box, server = self._boxes[channel], self._servers[channel]
         self.storm.tally.at.append(time.monotonic())  # what it took and had not said so comes again
         server.close()
+        self.storm.tally.at.append(time.monotonic())
         try:
-            yield self.storm.chance.uniform(4.0, 20.0)
+            yield self.storm.chance.uniform(*_LASTS)
         finally:
             server.enter_context(mail_server(box))

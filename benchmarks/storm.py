@@ -30,7 +30,7 @@ DECODE_SECONDS = 5.0
 CALM = 0.8
 """The part of the time after which the daemon is not killed any more: the last one lives through the rest."""
 _RESTART = 1.0
-_AFTERMATH = 20.0
+_AFTERMATH = 60.0
 """Seconds after a fault of state or configuration within which a start may still fail by it."""
 
 
@@ -275,7 +275,7 @@ class Storm(Chaos):
             ("all files judged", self.is_settled),
             ("all delivered", lambda: self.site.undelivered() == 0),
         ):
-            end = time.monotonic() + (patience := 300.0)
+            end = time.monotonic() + (patience := 1000.0)
             while not (self.is_ready() and condition()):
                 self.supervise()
                 if time.monotonic() > end:

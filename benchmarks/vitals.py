@@ -10,7 +10,7 @@ from storm import Lane, Storm
 
 from acceptance.hostile import peak
 
-_GROWTH, _MOST = 30.0, 400.0
+_GROWTH, _MOST = 60.0, 400.0
 """MB by which the last daemon may grow, and that a daemon may have resident at the most."""
 
 

@@ -40,6 +40,9 @@ DEADLINE = 30.0
 AFTER_ACCEPTANCE = 5.0
 """Seconds at most from the acceptance of a mail to a kill for it to come twice, if it could be marked."""
 
+ON_ITS_WAY = 1.0
+"""Seconds, at most, in which a server still accepts what a daemon sent before it was killed."""
+
 
 def hooked(**faults: object) -> dict[str, str]:
     """The environment in which `hook/sitecustomize.py` makes these faults happen."""
@@ -277,4 +280,4 @@ def _between(first: Mail, kill: float, second: Mail, held: list[tuple[float, flo
     begun = first.accepted
     for start, end in held:  # one after another
         begun += max(0.0, min(end, kill) - max(start, first.accepted))
-    return first.accepted <= kill < second.accepted and kill - begun < AFTER_ACCEPTANCE
+    return first.accepted - ON_ITS_WAY <= kill < second.accepted and kill - begun < AFTER_ACCEPTANCE
