@@ -7,6 +7,9 @@ WHEELS ?= --only-binary :all:
 # pytest processes: one more than the cores of a small machine, as many tests wait for what is due. Those
 # marked `timing` always run alone.
 JOBS ?= 3
+# Of `make chaos`: how long it takes, and what all its moments follow from.
+MINUTES ?= 30
+SEED ?= 1
 UV_VERSION := 0.13.9
 CYCLONEDX_VERSION := 7.5.0
 
@@ -16,7 +19,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 WHEELHOUSE := dist/wheelhouse
 
 .DEFAULT_GOAL := help
-.PHONY: help install test demo lint format types contracts docs audit sbom wheelhouse lock clean
+.PHONY: help install test chaos demo lint format types contracts docs audit sbom wheelhouse lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -39,6 +42,9 @@ test: $(VENV)/installed ## run all tests; those that measure time first and alon
 	$(BIN)/python -m pytest -m timing --junit-xml=build/tests-timing.xml || [ $$? -eq 5 ] || failed=1; \
 	$(BIN)/python -m pytest -m "not timing" -n $(JOBS) --dist worksteal --junit-xml=build/tests-main.xml || failed=1; \
 	exit $$failed
+
+chaos: $(VENV)/installed ## half an hour of faults at random moments, then a comparison with an undisturbed replay
+	$(BIN)/python benchmarks/chaos.py --minutes $(MINUTES) --seed $(SEED)
 
 demo: $(VENV)/installed ## a small dockserver, a faulty glider, the daemon, and the alert as it arrives
 	$(BIN)/python demo/demo.py

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from common import machine
 
 from acceptance.angus import FILES, angus
-from acceptance.hostile import PROGRAM, fill, peak, shown, workers
+from acceptance.hostile import fill, peak, program, shown, workers
 from acceptance.support import Daemon, Site, command, remora, results
 from gliderwatch.simulate.dockserver import Arrival, arrivals
 from gliderwatch.store.sqlite import Status
@@ -43,7 +43,7 @@ def main(hostile: int = 2500, crowd: int = 100_000, seed: int = 1) -> int:
         for number in range(crowd):
             (folder / f"crowd-2024-121-0-{number}.sbd").touch()
         names += [f"crowd-2024-121-0-{number}.sbd" for number in range(crowd)]
-        with Daemon(site, (sys.executable, "-c", PROGRAM)) as daemon:
+        with Daemon(site, (sys.executable, "-c", program())) as daemon:
             good = _Good(site, list(arrivals(bruce)))
             most, took = _watch(site, daemon, names, good)
             lives, largest, taken = daemon.alive(), peak(daemon.pid), good.taken()

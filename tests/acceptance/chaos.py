@@ -8,13 +8,24 @@ import shutil
 import sqlite3
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
-from acceptance.support import Daemon, Mail, Mailbox, Site, command, healthy, remora, results, until
+from acceptance.support import (
+    GLIDERWATCH,
+    Daemon,
+    Mail,
+    Mailbox,
+    Site,
+    command,
+    healthy,
+    remora,
+    results,
+    until,
+)
 from gliderwatch.alerts.mail import message_id
 from gliderwatch.errors import StateError
 from gliderwatch.simulate.dockserver import FileForm, Names, arrivals
@@ -22,17 +33,31 @@ from gliderwatch.simulate.scenario import Mission
 from gliderwatch.store.damage import damage
 from gliderwatch.store.sqlite import Status, Store
 
+SENDER = "gliderwatch@dockserver.local"
 HOOK = Path(__file__).with_name("hook")
 DEADLINE = 30.0
 """Seconds after which a daemon that found no commit to be killed at is killed all the same."""
 AFTER_ACCEPTANCE = 5.0
-"""Seconds between the acceptance of a mail and a kill, at the most, for it to be sent again."""
+"""Seconds at most from the acceptance of a mail to a kill for it to come twice, if it could be marked."""
+
+ON_ITS_WAY = 1.0
+"""Seconds, at most, in which a server still accepts what a daemon sent before it was killed."""
 
 
 def hooked(**faults: object) -> dict[str, str]:
     """The environment in which `hook/sitecustomize.py` makes these faults happen."""
     path = os.pathsep.join(filter(None, [str(HOOK), os.environ.get("PYTHONPATH")]))
     return {"PYTHONPATH": path} | {name: str(value) for name, value in faults.items()}
+
+
+def flood(folder: Path) -> None:
+    """More events of a folder than inotify keeps for one that does not read them."""
+    here, there = folder / ".one", folder / ".two"
+    here.touch()
+    for _ in range(int(Path("/proc/sys/fs/inotify/max_queued_events").read_text(encoding="ascii")) // 4 + 1):
+        here.rename(there)
+        there.rename(here)
+    here.unlink()
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,15 +96,17 @@ def coming(missions: list[Mission], chance: random.Random) -> list[Sent]:
 
 @dataclass(slots=True)
 class Tally:
-    """What was done and seen."""
+    """What was done and seen; ``at`` are the times of kills, in ``held`` no mail could be marked."""
 
     kills: Counter[str] = field(default_factory=Counter)
     at: list[float] = field(default_factory=list)
+    held: list[tuple[float, float]] = field(default_factory=list)
     copies: int = 0
     broken: list[str] = field(default_factory=list)
     files: int = 0
     doubles: int = 0
     alerts: int = 0
+    refused: int = 0
     dives: int = 0
     incidents: int = 0
 
@@ -87,26 +114,28 @@ class Tally:
 class Chaos:
     """One live feed with kills; every moment and place of them follows from the seed."""
 
-    def __init__(self, site: Site, missions: list[Mission], seed: int) -> None:
+    def __init__(
+        self, site: Site, missions: list[Mission], seed: int, program: Sequence[object] = (GLIDERWATCH,)
+    ) -> None:
         self.site, self.chance, self.tally = site, random.Random(seed), Tally()
         self._files: Iterator[Sent] = iter(files := coming(missions, self.chance))
-        self._last, self._copies = files[0], 0
+        self._last, self._copies, self.total = files[0], 0, len(files)
         self.sizes: dict[str, int] = {}
-        self.daemon = Daemon(site)
+        self.daemon = Daemon(site, program)
 
     def kill(self, times: int) -> None:
         """Let it live and die so many times."""
         for number in range(times):
             self._life(number % 2 == 0)
-            self._copy()
+            self.copy()
 
     def finish(self) -> None:
         """Let the rest come, and a last daemon do its work to the end."""
-        while self._put():
+        while self.put():
             pass
         self.daemon.env = {}
         self.daemon.start().ready()
-        until(self._is_settled, "all files judged", 600.0)
+        until(self.is_settled, "all files judged", 600.0)
         until(lambda: self.site.undelivered() == 0, "all delivered")
         assert self.daemon.stop() == 0
 
@@ -132,7 +161,7 @@ class Chaos:
         self.daemon.ready()
         return self.chance.uniform(0.0, 2.0)
 
-    def _put(self) -> Path | None:
+    def put(self) -> Path | None:
         """The next file comes; None: there is none any more."""
         file = next(self._files, None)
         if file is None:
@@ -141,7 +170,7 @@ class Chaos:
         return self._deliver(file)
 
     def _put_any(self) -> Path:
-        path = self._put()
+        path = self.put()
         if path is not None:
             return path
         self._copies += 1  # another copy of what is known: the ledger grows, nothing else may
@@ -163,11 +192,14 @@ class Chaos:
             return False
         return file is not None and file.size == self.sizes[str(path)]
 
-    def _is_settled(self) -> bool:
+    def is_settled(self) -> bool:
+        """Whether the last word is said on every file that came."""
         with closing(Store.reading(self.site.state)) as store:
-            return self.sizes == {file.path: file.size for file in store.files(*Status)}
+            judged = set(Status) - {Status.WAITING}
+            known = {file.path: file.size for file in store.files(*judged)}
+        return self.sizes.items() <= known.items()
 
-    def _copy(self) -> None:
+    def copy(self) -> None:
         """What a power cut would leave at this moment is whole."""
         if not self.site.state.exists() or not self.site.state.stat().st_size:
             return
@@ -184,8 +216,8 @@ class Chaos:
             self.tally.broken.append(str(found))
 
 
-def differences(chaos: Chaos, box: Mailbox) -> list[str]:
-    """In what this differs from one undisturbed replay and from messages told once; empty: in nothing."""
+def differences(chaos: Chaos, boxes: Mapping[str, Mailbox]) -> list[str]:
+    """In what this differs from one undisturbed replay, and each channel's mails from messages told once."""
     site, tally = chaos.site, chaos.tally
     out = site.config.with_name("out")
     replay = command("run", "-c", site.config, "--replay", site.root, "--out", out, timeout=600.0)
@@ -196,7 +228,9 @@ def differences(chaos: Chaos, box: Mailbox) -> list[str]:
     found = [f"{g}: other results than a replay's" for g in undisturbed if live.get(g) != undisturbed[g]]
     found += [f"{g}: other segments" for g in undisturbed if _extent(site.state, g) != _extent(out, g)]
     found += [f"a copy of the state is broken: {text}" for text in tally.broken]
-    return found + _mails(chaos, box)
+    for channel, box in boxes.items():
+        found += _mails(chaos, channel, box)
+    return found
 
 
 def _extent(state: Path, glider: str) -> tuple[int, int]:
@@ -204,23 +238,46 @@ def _extent(state: Path, glider: str) -> tuple[int, int]:
         return store.extent(glider)
 
 
-def _mails(chaos: Chaos, box: Mailbox) -> list[str]:
-    with closing(Store.reading(chaos.site.state)) as store:
-        wanted = {message_id(alert.id, "gliderwatch@dockserver.local"): alert.id for alert in store.alerts()}
+def _mails(chaos: Chaos, channel: str, box: Mailbox) -> list[str]:
+    sql = "SELECT alert, error, incident FROM outbox WHERE channel = ? ORDER BY id"
+    with closing(sqlite3.connect(chaos.site.state)) as db:
+        rows = {message_id(row[0], SENDER): row for row in db.execute(sql, (channel,))}
     times: dict[str, list[Mail]] = {}
     for mail in list(box.mails):
         times.setdefault(mail.id, []).append(mail)
-    chaos.tally.alerts, chaos.tally.doubles = len(wanted), sum(len(m) - 1 for m in times.values())
-    found = [f"{alert} never arrived" for id_, alert in wanted.items() if id_ not in times]
-    found += [f"nobody made the mail {m[0].subject}" for id_, m in times.items() if id_ not in wanted]
+    chaos.tally.alerts += len(rows)
+    chaos.tally.refused += sum(bool(error) for _, error, _ in rows.values())
+    chaos.tally.doubles += sum(len(m) - 1 for m in times.values())
+    never = [alert for id_, (alert, error, _) in rows.items() if id_ not in times and not error]
+    found = [f"{channel}: {alert} never came" for alert in never]
+    found += [
+        f"{channel}: nobody made the mail {m[0].subject}" for id_, m in times.items() if id_ not in rows
+    ]
+    found += _disorder(channel, rows, times)
     for same in times.values():
         for first, second in pairwise(same):
             if (first.subject, first.text) != (second.subject, second.text):
                 found.append(f"{first.subject} came twice with different texts")
-            if not any(_between(first, kill, second) for kill in chaos.tally.at):
+            if not any(_between(first, kill, second, chaos.tally.held) for kill in chaos.tally.at):
                 found.append(f"{first.subject} came twice without a kill between its acceptance and its mark")
     return found
 
 
-def _between(first: Mail, kill: float, second: Mail) -> bool:
-    return first.accepted <= kill < second.accepted and kill - first.accepted < AFTER_ACCEPTANCE
+def _disorder(channel: str, rows: dict[str, tuple[str, str, str]], times: dict[str, list[Mail]]) -> list[str]:
+    """Messages of one incident that came before an older one."""
+    last: dict[str, float] = {}
+    found = []
+    for id_, (alert, _, incident) in rows.items():
+        if incident and id_ in times:
+            came = times[id_][0].accepted
+            if came < last.get(incident, 0.0):
+                found.append(f"{channel}: {alert} came before an older one of its incident")
+            last[incident] = came
+    return found
+
+
+def _between(first: Mail, kill: float, second: Mail, held: list[tuple[float, float]]) -> bool:
+    begun = first.accepted
+    for start, end in held:  # one after another
+        begun += max(0.0, min(end, kill) - max(start, first.accepted))
+    return first.accepted - ON_ITS_WAY <= kill < second.accepted and kill - begun < AFTER_ACCEPTANCE

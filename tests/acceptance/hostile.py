@@ -13,21 +13,25 @@ import lz4.block
 import bad_decode
 from gliderwatch.ingest.decode import decode
 
-TIMEOUT = 2.0
-PROGRAM = f"""
+_PROGRAM = """
 import functools, sys
-sys.path[:0] = {[str(Path(__file__).parents[1])]!r}
+sys.path[:0] = {folders!r}
 from acceptance.hostile import misbehave
 from gliderwatch.run import parts
-parts.Decoder = functools.partial(parts.Decoder, decode=misbehave, timeout={TIMEOUT})
+parts.Decoder = functools.partial(parts.Decoder, decode=misbehave, timeout={timeout})
 from gliderwatch.cli import main
 if __name__ == "__main__":
     main()
 """
-"""The command as installed, but for a decoder that does to its worker what the name of a file says."""
 
 _MISDEEDS = ("hang", "hang-in-c", "crash", "exit", "memory", "error")
 _HUGE = 1 << 30
+
+
+def program(timeout: float = 2.0) -> str:
+    """The command as installed, but for a decoder that does to its worker what the name of a file says,
+    and may take `timeout` seconds."""
+    return _PROGRAM.format(folders=[str(Path(__file__).parents[1])], timeout=timeout)
 
 
 def misbehave(path: Path, caches: Sequence[Path]) -> object:

@@ -121,10 +121,11 @@ class Mailbox:
 
 @contextmanager
 def mail_server(box: Mailbox | None = None) -> Iterator[Mailbox]:
-    """A mail server on a port of its own."""
+    """A mail server on a port of its own; one that was stopped comes back on the port it had."""
     box = box if box is not None else Mailbox()
     with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        probe.bind(("127.0.0.1", box.port))
         box.port = probe.getsockname()[1]
     server = Controller(box, hostname="127.0.0.1", port=box.port)
     server.start()
@@ -261,6 +262,7 @@ class Daemon:
         self.scratch = site.config.with_name("scratch")
         self.scratch.mkdir(exist_ok=True)
         self.process: subprocess.Popen[bytes] | None = None
+        self._begun = 0
 
     def __enter__(self) -> Daemon:
         return self.start().ready()
@@ -276,6 +278,7 @@ class Daemon:
     def start(self) -> Daemon:
         """Start it; `ready` waits until it watches."""
         with self.log_path.open("ab") as log:
+            self._begun = log.tell()
             self.process = subprocess.Popen(
                 [*self.program, "run", "-c", self.site.config],
                 env=os.environ | {"TMPDIR": str(self.scratch)} | self.env,
@@ -295,10 +298,16 @@ class Daemon:
 
         def watches() -> bool:
             assert self.alive(), f"it ended: {self.text()}"
-            return f'"pid": {self.pid},' in self.text()
+            return self.watches()
 
         until(watches, "watching")
         return self
+
+    def watches(self) -> bool:
+        """Whether it has said since its start that it watches."""
+        with self.log_path.open("rb") as log:
+            log.seek(self._begun)
+            return f'"pid": {self.pid},'.encode() in log.read()
 
     def text(self) -> str:
         """All that it ever said."""

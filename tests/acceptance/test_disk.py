@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import resource
-import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -14,6 +11,7 @@ import pytest
 
 from acceptance.angus import FILES, MISSION, put, taken
 from acceptance.chaos import hooked
+from acceptance.disk import Disk
 from acceptance.support import (
     GLIDERWATCH,
     TRACEBACK,
@@ -31,45 +29,6 @@ from gliderwatch.run.trouble import PAUSE
 from gliderwatch.store.sqlite import Store
 
 EARLY, LATE = FILES[:3], FILES[3:]
-WRITABLE = 64 * 1024
-
-
-class Disk:
-    """The disk of a state, which can be full: a small one of its own where this user may mount one, else
-    no file of the daemon may grow beyond a limit, which SQLite meets in the same place."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        folder.mkdir(exist_ok=True)
-        mount = ["mount", "-t", "tmpfs", "-o", "size=6m", "gliderwatch-test", str(folder)]
-        self.is_real = (
-            os.getuid() == 0 and subprocess.run(mount, capture_output=True, check=False).returncode == 0
-        )
-
-    def fill(self, daemon: Daemon) -> None:
-        """No room any more."""
-        if not self.is_real:
-            resource.prlimit(daemon.pid, resource.RLIMIT_FSIZE, (WRITABLE, resource.RLIM_INFINITY))
-            return
-        with (self.folder / "filler").open("wb", buffering=0) as filler:
-            try:
-                while filler.write(bytes(4096)):
-                    pass
-            except OSError:
-                return
-
-    def free(self, daemon: Daemon) -> None:
-        """Room again."""
-        if self.is_real:
-            (self.folder / "filler").unlink()
-        else:
-            unlimited = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
-            resource.prlimit(daemon.pid, resource.RLIMIT_FSIZE, unlimited)
-
-    def end(self) -> None:
-        """Take it away."""
-        if self.is_real:
-            subprocess.run(["umount", "--lazy", str(self.folder)], check=True)
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from acceptance.angus import FILES, put, taken
-from acceptance.hostile import PROGRAM, fill, peak, shown, workers
+from acceptance.hostile import fill, peak, program, shown, workers
 from acceptance.support import TRACEBACK, Daemon, Site, command, remora, results, until
 from gliderwatch.simulate.dockserver import arrivals
 from gliderwatch.store.sqlite import Status
@@ -39,7 +39,7 @@ def test_hundreds_of_hostile_files_are_named_and_good_ones_are_taken(site_of_two
     site = site_of_two
     names = fill(site.folder("angus"), [file.data for file in FILES], N, seed=1)
     most = 0.0
-    with Daemon(site, (sys.executable, "-c", PROGRAM)) as daemon:
+    with Daemon(site, (sys.executable, "-c", program())) as daemon:
         put(site, *GOOD, glider="bruce")
         taken(site, *GOOD)
         missing = set(map(shown, names))
@@ -153,7 +153,7 @@ def test_a_folder_of_thousands_delays_nobody(site_of_two: Site) -> None:
 def test_the_root_is_left_as_it_was(site: Site) -> None:
     names = fill(site.folder("angus"), [file.data for file in FILES], 60, seed=2)
     before = {p: (p.lstat().st_mtime_ns, p.lstat().st_mode) for p in site.root.rglob("*")}
-    with Daemon(site, (sys.executable, "-c", PROGRAM)):
+    with Daemon(site, (sys.executable, "-c", program())):
         until(lambda: set(map(shown, names)) <= site.files().keys(), "all named")
     after = {p: (p.lstat().st_mtime_ns, p.lstat().st_mode) for p in site.root.rglob("*")}
     assert after == before

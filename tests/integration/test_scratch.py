@@ -12,6 +12,12 @@ import pytest
 from gliderwatch.ingest.scratch import Scratch
 
 HOLD = "from gliderwatch.ingest.scratch import Scratch; print(Scratch().name, flush=True); input()"
+KILLED = """
+import multiprocessing, os, signal, sys
+from gliderwatch.ingest.decode import _prepare
+multiprocessing.get_context("spawn").Process(target=_prepare, args=(sys.argv[1], 1 << 40)).start()
+os.kill(os.getpid(), signal.SIGKILL)
+"""
 
 
 @pytest.fixture(autouse=True)
@@ -46,3 +52,12 @@ def test_a_link_is_not_followed(folder: Path) -> None:
     (folder / "gliderwatch-scratch-x").symlink_to(folder / "precious")
     Scratch().cleanup()
     assert (folder / "precious" / "file").exists()
+
+
+def test_a_worker_that_starts_while_its_daemon_is_killed_ends_without_a_word(folder: Path) -> None:
+    """The next daemon has removed the folder of the one before by then."""
+    gone = folder / "gliderwatch-scratch-gone"
+    command = [sys.executable, "-c", KILLED, str(gone)]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert ended.returncode < 0
+    assert ended.stderr == ""  # all of it: it is closed by the worker, whose it is as well

@@ -228,7 +228,13 @@ def _prepare(scratch: str, memory: int) -> None:
     for kind, limit in ((resource.RLIMIT_AS, memory), (resource.RLIMIT_CORE, 0)):
         hard = resource.getrlimit(kind)[1]
         resource.setrlimit(kind, (limit if hard < 0 else min(limit, hard), hard))
-    _dbdreader()
+    parent = multiprocessing.parent_process()
+    try:
+        _dbdreader()
+    except OSError:
+        if parent is None or parent.is_alive():
+            raise
+        os._exit(1)  # the daemon was killed meanwhile, and the next one has removed the scratch folder
 
 
 def _work(decode: Decode, path: Path, cache_folders: Sequence[Path], seconds: float) -> bytes:

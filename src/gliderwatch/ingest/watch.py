@@ -24,7 +24,13 @@ from watchdog.events import (
 )
 from watchdog.observers.api import BaseObserver, ObservedWatch
 from watchdog.observers.inotify import InotifyObserver
-from watchdog.observers.inotify_c import InotifyConstants, inotify_add_watch, inotify_init
+from watchdog.observers.inotify_c import (
+    InotifyConstants,
+    InotifyEvent,
+    InotifyFD,
+    inotify_add_watch,
+    inotify_init,
+)
 from watchdog.observers.polling import PollingObserverVFS
 
 from gliderwatch.ingest import names
@@ -61,7 +67,12 @@ class TreeChanged:
     path: Path
 
 
-Change = FileChanged | CacheChanged | TreeChanged
+@dataclass(frozen=True, slots=True)
+class EventsLost:
+    """Inotify could not keep up and lost events: restart the watcher, and scan."""
+
+
+Change = FileChanged | CacheChanged | TreeChanged | EventsLost
 
 
 class Sink(Protocol):
@@ -131,9 +142,22 @@ class Watcher:
         else:
             # Full events tell a file that was moved in from one that has only been begun.
             observer = InotifyObserver(generate_full_events=True)
+            self._heed_losses(observer._inotify_fd)
         observer.start()
         self._observer = observer
         self.refresh()
+
+    def _heed_losses(self, reader: InotifyFD) -> None:
+        """Tell of an overflow. Watchdog alone would watch again what is at each path at that moment, if
+        anything is, and never look again: a root that is away just then would be unwatched for good."""
+
+        def heed(event: InotifyEvent) -> None:
+            if event.is_queue_overflow:
+                self._queue.put(EventsLost())
+            else:
+                type(reader).handle_event(reader, event)
+
+        reader.handle_event = heed  # type: ignore[method-assign]
 
     def _polls(self) -> bool:
         return self._kind == "polling" or bool(self._instead)

@@ -21,7 +21,7 @@ import structlog
 
 from gliderwatch.config import Config, load
 from gliderwatch.errors import ConfigError, DamagedError, GliderwatchError, Quarantine, StateError
-from gliderwatch.ingest.watch import CacheChanged, FileChanged
+from gliderwatch.ingest.watch import CacheChanged, EventsLost, FileChanged
 from gliderwatch.model import Alert, Segment
 from gliderwatch.run import arrivals, heartbeat, intake, logs, notify, recovery
 from gliderwatch.run.backlog import Job
@@ -165,6 +165,10 @@ class Daemon:
             self._retry = True
         elif news == signal.SIGHUP:
             self._reload()
+        elif isinstance(news, EventsLost):
+            log.warning("inotify lost events, all is watched anew", reason="its queue overflowed")
+            self._parts.watcher.restart()
+            self._next_scan = time.monotonic()
         else:  # a folder came: files may have come in it before it was watched
             self._next_scan = time.monotonic()
 
