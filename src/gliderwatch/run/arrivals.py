@@ -1,4 +1,4 @@
-"""What to do with a file that is complete: known already, to wait, to leave alone, or to decode."""
+"""What to do with a file that has come: let it settle; once complete, decode it, wait, or leave it alone."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 from gliderwatch.errors import MissingCache, Quarantine, Retry
 from gliderwatch.ingest.caches import find_cache
 from gliderwatch.ingest.header import read_header
+from gliderwatch.ingest.settle import Settling
 from gliderwatch.run.backlog import Job
 from gliderwatch.store.sqlite import File, Status, Store
 
@@ -24,6 +25,16 @@ def state(path: Path) -> tuple[int, int] | None:
     except OSError:
         return 0, 0
     return status.st_size, status.st_mtime_ns
+
+
+def observe(path: Path, settling: Settling, now: float) -> None:
+    """Let a file settle that has changed; `now` is monotonic (s)."""
+    try:
+        status = path.lstat()
+    except OSError:  # gone or renamed: its new name is news of its own
+        settling.forget(path)
+        return
+    settling.observe(path, status.st_size, status.st_mtime_ns, now)
 
 
 def judge(

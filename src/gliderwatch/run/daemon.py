@@ -12,7 +12,6 @@ import sys
 import threading
 import time
 from collections import deque
-from dataclasses import replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from types import FrameType
@@ -20,19 +19,17 @@ from types import FrameType
 import structlog
 
 from gliderwatch.config import Config, load
-from gliderwatch.errors import ConfigError, DamagedError, GliderwatchError, Quarantine, StateError
+from gliderwatch.errors import ConfigError, DamagedError, GliderwatchError
 from gliderwatch.ingest.watch import CacheChanged, EventsLost, FileChanged
-from gliderwatch.model import Alert, Segment
-from gliderwatch.run import arrivals, heartbeat, intake, logs, notify, recovery
-from gliderwatch.run.backlog import Job
+from gliderwatch.run import arrivals, heartbeat, intake, notify, recovery
 from gliderwatch.run.heartbeat import Upkeep
-from gliderwatch.run.intake import Speaking
 from gliderwatch.run.life import BEAT, Life
 from gliderwatch.run.parts import Decoded, News, Parts, build
+from gliderwatch.run.reception import Reception
 from gliderwatch.run.ticking import Ticking
 from gliderwatch.run.trouble import Trouble
 from gliderwatch.store.retention import Retention
-from gliderwatch.store.sqlite import File, Status
+from gliderwatch.store.sqlite import Status
 
 log = structlog.get_logger(__name__)
 
@@ -59,11 +56,13 @@ class Daemon:
         self._news: SimpleQueue[News] = SimpleQueue()
         self._wake = threading.Event()
         self._stopping = False
+        self._reception = Reception(self._store, self._upkeep, self._wake, self._is_stopping)
         self._use(build(config, self._news, self._wake, workers))
 
     def _use(self, parts: Parts) -> None:
         """Work with these parts, from nothing: a scan finds again what was at hand."""
-        self._parts, self._caches = parts, parts.watcher.cache_folders()
+        self._parts = parts
+        self._reception.use(parts)
         self._upkeep.use(parts.config)
         self._settled: deque[Path] = deque()
         self._caught_up = self._retry = False
@@ -100,6 +99,9 @@ class Daemon:
             self._life.end()
             log.info("stopped")
 
+    def _is_stopping(self) -> bool:
+        return self._stopping
+
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         self._stopping = self._stopping or number != signal.SIGHUP
         self._news.put(signal.Signals(number))  # wakes the loop
@@ -119,7 +121,7 @@ class Daemon:
         else:
             self._settled.extend(fresh)
         for _ in range(min(_AT_ONCE, len(self._settled))):
-            self._judge(self._settled[0])
+            self._reception.judge(self._settled[0])
             self._settled.popleft()  # only now: when the state cannot be used, it has its turn again
         if not self._settled or 0 < len(fresh) <= _AT_ONCE:
             self._parts.feed()  # all that came together is in order of time before the first is taken
@@ -158,9 +160,9 @@ class Daemon:
         if self._stopping:
             return
         if isinstance(news, Decoded):
-            self._on_decoded(news)
+            self._reception.decoded(news)
         elif isinstance(news, FileChanged):
-            self._observe(news.path)
+            arrivals.observe(news.path, self._parts.settling, time.monotonic())
         elif isinstance(news, CacheChanged):
             self._retry = True
         elif news == signal.SIGHUP:
@@ -172,22 +174,13 @@ class Daemon:
         else:  # a folder came: files may have come in it before it was watched
             self._next_scan = time.monotonic()
 
-    def _observe(self, path: Path) -> None:
-        settling = self._parts.settling
-        try:
-            status = path.lstat()
-        except OSError:  # gone or renamed: its new name is news of its own
-            settling.forget(path)
-            return
-        settling.observe(path, status.st_size, status.st_mtime_ns, time.monotonic())
-
     def _is_still(self, path: Path) -> bool:
         """Whether a file is as it was when it settled; one that has grown since settles anew."""
         settling = self._parts.settling
         if arrivals.state(path) in (None, settling.passed(path)):
             return True
         settling.forget(path)
-        self._observe(path)
+        arrivals.observe(path, settling, time.monotonic())
         return False
 
     def _scan(self) -> None:
@@ -209,109 +202,21 @@ class Daemon:
     def _retry_waiting(self) -> None:
         """Look again at the files that wait; one that has changed since has to settle first."""
         self._retry = False
-        self._caches = self._parts.decoder.cache_folders = self._parts.watcher.cache_folders()
+        self._parts.decoder.cache_folders = self._parts.watcher.cache_folders()
         for file in self._store.files(Status.WAITING, Status.UNKNOWN):
             path = Path(file.path)
             if arrivals.state(path) in (None, (file.size, file.mtime_ns)):
-                self._judge(path)
+                self._reception.judge(path)
             else:
-                self._observe(path)
+                arrivals.observe(path, self._parts.settling, time.monotonic())
 
-    # ------------------------------------------------------------------- files
-
-    def _judge(self, path: Path) -> None:
-        found = arrivals.judge(path, self._store, self._caches, self._is_known)
-        if isinstance(found, Job):
-            self._upkeep.queued(found)
-            self._parts.backlog.add(found)
-        elif found is not None:
-            self._note(found)
-
-    def _is_known(self, glider: str) -> bool:
-        return glider in self._parts.config.gliders
-
-    def _on_decoded(self, news: Decoded) -> None:
-        backlog = self._parts.backlog
-        if news.backlog is not backlog:
-            return  # of before the configuration was read again: the scan has found it again
-        self._upkeep.decoded(news.job)
-        backlog.finish(news.job, news.outcome)
-        while (job := backlog.decoded(news.job.header.id.glider)) is not None:
-            try:
-                self._take(job)
-            except StateError:
-                self._again(Path(job.file.path))
-                raise
-        self._parts.feed()
-
-    def _take(self, job: Job) -> None:
-        path, result, glider = Path(job.file.path), job.result, job.header.id.glider
-        if arrivals.state(path) not in (None, (job.file.size, job.file.mtime_ns)):
-            # it has grown, or is another one: what was decoded may be of before or of after
-            self._again(path)
-            self._speak(glider)
-        elif isinstance(result, Segment) and result.id == job.header.id:
-            self._take_in(job.file, result)
-        elif isinstance(result, Exception):
-            self._note(arrivals.failed(job.file, result))
-        else:  # it was replaced between header and decoding, and has gone since
-            self._speak(glider)
-
-    def _again(self, path: Path) -> None:
-        """Let a file have its turn once more."""
-        self._parts.settling.forget(path)
-        self._observe(path)
-
-    def _take_in(self, file: File, segment: Segment) -> None:
-        glider = segment.id.glider
-        if self._store.is_past(segment.id):
-            reason = "older than what state.keep_days keeps"
-            self._note(replace(file, status=Status.DUPLICATE, reason=reason, opened_at=None))
-            return
-        params, speaking = self._parts.config.glider(glider), self._speaking(glider)
-        begun = time.monotonic()
-        try:
-            now, ocean = time.time(), self._parts.ocean.field(glider)
-            with self._store.followed_by(self._parts.backlog.behind(glider)):
-                taken = intake.take(
-                    self._store, file, segment, params, speaking, now, self._is_stopping, ocean
-                )
-        except Quarantine as error:
-            log.error("file cannot be assessed", path=file.path, glider=glider, exc_info=error.__cause__)
-            self._note(arrivals.failed(file, error))
-        else:
-            self._told(taken, time.monotonic() - begun)
-
-    def _is_stopping(self) -> bool:
-        return self._stopping
-
-    def _note(self, file: File) -> None:
-        """Write down what became of a file that is not taken (now), if that is new."""
-        if self._store.file(file.path) == file:
-            self._speak(file.glider)
-            return
-        params, speaking = self._parts.config.glider(file.glider), self._speaking(file.glider)
-        self._told(intake.note(self._store, file, params, speaking, time.time()))
-
-    def _speaking(self, glider: str) -> Speaking | None:
-        """Who is told of a glider; None while more of its files are at hand: the last speaks for all."""
-        last = self._is_known(glider) and not self._parts.backlog.more(glider)
-        return self._parts.speaking if last else None
-
-    def _speak(self, glider: str) -> None:
-        """Say what is to be said of a glider without a new file."""
-        speaking = self._speaking(glider)
-        if speaking is not None:
-            params = self._parts.config.glider(glider)
-            self._alerted(intake.speak(self._store, glider, params, speaking, time.time()))
+    # ------------------------------------------------------------------- life
 
     def _catch_up(self) -> None:
         """After a start, once all files are in: say what an earlier life left unsaid."""
-        if self._caught_up or self._parts.backlog:
-            return
-        for glider in self._store.gliders():
-            self._speak(glider)
-        self._caught_up = True
+        if not self._caught_up and not self._parts.backlog:
+            self._reception.speak_of_all()
+            self._caught_up = True
 
     def _tick(self) -> None:
         """Say which gliders are overdue, and look again when the next may be."""
@@ -319,19 +224,7 @@ class Daemon:
         now, is_busy = time.monotonic(), self._parts.backlog.more
         alerts, pause = self._ticking.tick(gliders, speaking, is_busy, time.time(), now)
         self._next_tick = now + pause
-        self._alerted(alerts)
-
-    def _told(self, taken: intake.Taken, seconds: float | None = None) -> None:
-        logs.taken(taken)
-        self._upkeep.took(taken, seconds)
-        self._alerted(taken.alerts)
-
-    def _alerted(self, alerts: tuple[Alert, ...]) -> None:
-        logs.alerts(alerts)
-        if alerts:
-            self._wake.set()
-
-    # ------------------------------------------------------------------- life
+        self._reception.alerted(alerts)
 
     def _beat(self) -> None:
         """A sign of life, if all parts live; a dead observer is started again."""
@@ -343,7 +236,7 @@ class Daemon:
             self._next_scan = time.monotonic()
         at_hand = len(backlog) + len(self._settled)
         is_well = self._upkeep.is_well(self._parts.dispatcher, backlog.decoding)
-        self._alerted(self._upkeep.beat(is_well, at_hand))
+        self._reception.alerted(self._upkeep.beat(is_well, at_hand))
         if not is_well:
             return
         self._life.beat()
