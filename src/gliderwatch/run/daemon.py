@@ -218,6 +218,8 @@ class Daemon:
             self._parts.backlog.add(found)
         elif found is not None:
             self._note(found)
+        if arrivals.state(path) is None:  # it may come back as it was: a share that was away
+            self._parts.settling.forget(path)
 
     def _is_known(self, glider: str) -> bool:
         return glider in self._parts.config.gliders
@@ -247,6 +249,7 @@ class Daemon:
         elif isinstance(result, Exception):
             self._note(arrivals.failed(job.file, result))
         else:  # it was replaced between header and decoding, and has gone since
+            self._parts.settling.forget(path)
             self._speak(glider)
 
     def _again(self, path: Path) -> None:
