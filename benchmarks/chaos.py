@@ -110,7 +110,8 @@ def _progress(storm: Storm) -> Lane:
         tally, mails = storm.tally, sum(len(box.mails) for box in storm.boxes.values())
         text = f"{storm.clock()} {tally.files} of {storm.total} files, {tally.kills.total()} kills, "
         text += f"{storm.done.total()} other faults, {mails} mails, {memory([storm.daemon.pid])[1]:.0f} MB; "
-        print(text + f"wrong so far: {'; '.join(storm.complaints()) or 'nothing'}", flush=True)
+        wrong = storm.complaints()
+        print(text + f"wrong so far: {f'{len(wrong)}, as {wrong[0]}' if wrong else 'nothing'}", flush=True)
 
 
 def _left(storm: Storm) -> list[str]:

@@ -289,6 +289,6 @@ class Storm(Chaos):
             self.wrong.append(f"the daemon ended with {code}")
 
     def complaints(self) -> list[str]:
-        """What is wrong so far."""
+        """What is wrong so far, each once."""
         found = [*self.wrong, *(f"a copy of the state is broken: {text}" for text in self.tally.broken)]
-        return found + logbook.complaints(self.daemon.text())
+        return list(dict.fromkeys(found + logbook.complaints(self.daemon.text())))

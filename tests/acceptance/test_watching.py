@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from acceptance.angus import FILES, put, taken
+from acceptance.angus import FILES, SHORT, put, taken
 from acceptance.chaos import flood, hooked
 from acceptance.support import Daemon, Site, until
 from gliderwatch.store.sqlite import Status
@@ -114,6 +114,40 @@ def test_a_root_that_is_unmounted_and_back(site: Site, observer: str) -> None:
         assert daemon.alive()
         assert site.statuses(*(f.name for f in FILES)) == [Status.TAKEN] * len(FILES)
         assert len(daemon.log("file taken")) == len(FILES), "taken twice"
+
+
+def test_a_fuller_copy_that_waited_while_the_root_was_away_is_taken(site: Site) -> None:
+    """What was known of the segment was a cut copy; the fuller one had not been read when the root went."""
+    site.configure("angus", rescan_seconds=1)
+    cut, root, cache = SHORT[0], site.root.with_name("away"), site.cache.with_name("cache-away")
+    whole = FILES[0].name
+    with Daemon(site) as daemon:
+        site.put("angus", cut.name, cut.data[: len(cut.data) // 2])
+        taken(site, cut)
+        site.cache.rename(cache)
+        put(site, FILES[0])
+        until(lambda: site.statuses(whole) == [Status.WAITING], "waits for its cache")
+        site.root.rename(root)
+        until(lambda: site.statuses(whole) == [Status.DUPLICATE], "taken for renamed")
+        cache.rename(site.cache)
+        root.rename(site.root)
+        taken(site, FILES[0])
+        assert daemon.stop() == 0
+
+
+def test_a_file_that_settled_while_the_root_was_away_is_taken(site: Site) -> None:
+    site.configure("angus", rescan_seconds=1)
+    away = site.root.with_name("away")
+    with Daemon(site) as daemon:
+        put(site, FILES[1])
+        taken(site, FILES[1])
+        put(site, SHORT[0])
+        time.sleep(0.5)  # seen, and not yet complete: that takes a second, and by then it is not there
+        site.root.rename(away)
+        until(lambda: len(daemon.log("folder left out")) > 2, "more than a second has gone by")
+        away.rename(site.root)
+        taken(site, SHORT[0])
+        assert daemon.stop() == 0
 
 
 def test_new_cache_folders_of_a_pattern_are_noticed(site: Site, tmp_path: Path) -> None:

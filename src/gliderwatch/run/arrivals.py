@@ -14,6 +14,8 @@ from gliderwatch.run.backlog import Job
 from gliderwatch.store.sqlite import File, Status, Store
 
 DONE = (Status.TAKEN, Status.DUPLICATE, Status.QUARANTINED)
+RENAMED = "was renamed"
+"""Why a file that waited and has gone is a duplicate. It was not read: if it comes back, it is to be."""
 
 
 def state(path: Path) -> tuple[int, int] | None:
@@ -67,6 +69,8 @@ def _is_settled(before: File, caches: Sequence[Path], is_known: Callable[[str], 
     """Whether nothing more can be done for a file that has not changed."""
     if before.status == Status.UNKNOWN:
         return bool(before.glider) and not is_known(before.glider)
+    if before.reason == RENAMED:
+        return False
     return before.status in DONE or (bool(before.crc) and _is_missing(before.crc, caches))
 
 
@@ -95,7 +99,7 @@ def _gone(before: File | None, store: Store, is_known: Callable[[str], bool]) ->
     if store.completeness(before.glider, before.segment) is None:
         reason = "is not there any more, and its segment has not come under another name"
         return replace(before, status=Status.WAITING, reason=reason, crc="")
-    return replace(before, status=Status.DUPLICATE, reason="was renamed", crc="")
+    return replace(before, status=Status.DUPLICATE, reason=RENAMED, crc="")
 
 
 def _is_missing(crc: str, caches: Sequence[Path]) -> bool:

@@ -47,6 +47,8 @@ class Reception:
             self._parts.backlog.add(found)
         elif found is not None:
             self._note(found)
+        if arrivals.state(path) is None:  # it may come back as it was: a share that was away
+            self._parts.settling.forget(path)
 
     def decoded(self, news: Decoded) -> None:
         """Take the files of a glider that are decoded, in their order.
@@ -91,6 +93,7 @@ class Reception:
         elif isinstance(result, Exception):
             self._note(arrivals.failed(job.file, result))
         else:  # it was replaced between header and decoding, and has gone since
+            self._parts.settling.forget(path)
             self._speak(glider)
 
     def _again(self, path: Path) -> None:
