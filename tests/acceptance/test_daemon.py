@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from acceptance.angus import FILES, plenty, put, taken
+from acceptance.chaos import hooked
 from acceptance.support import (
     TRACEBACK,
     Daemon,
@@ -73,6 +74,21 @@ def test_a_signal_ends_it_within_5_s_also_in_the_middle_of_a_backlog(
         assert time.monotonic() - begun < 5.0
     assert len(site.files()) < files, "it did all of its work first: a test of nothing"
     assert TRACEBACK not in daemon.text()
+
+
+@pytest.mark.timing
+def test_sigterm_ends_it_within_5_s_on_a_share_that_is_slow_to_open_each_file(site: Site) -> None:
+    slow = site.config.with_name("slow")
+    slow.touch()
+    files = plenty(site)
+    with Daemon(site, **hooked(CHAOS_SLOW=slow)) as daemon:
+        until(lambda: daemon.log("watching"), "it watches")
+        time.sleep(1.0)  # it is opening the first of so many, or this test proves nothing: see its end
+        begun = time.monotonic()
+        os.kill(daemon.pid, signal.SIGTERM)
+        assert daemon.wait() == 0
+        assert time.monotonic() - begun < 5.0
+    assert len(site.files()) < files
 
 
 @pytest.mark.timing

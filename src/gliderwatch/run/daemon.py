@@ -35,7 +35,9 @@ log = structlog.get_logger(__name__)
 
 _AT_ONCE = 100
 """Files looked at in one turn, so that signals and signs of life do not wait for a long list."""
-_TURN = 0.0005
+_LONGEST_TURN = 2.0
+"""Seconds after which it is enough of them: on a share that is slow to open each."""
+_SWITCH = 0.0005
 """Seconds after which a thread that has something to do interrupts the estimation (Python: 0.005). What the
 decoder sends comes through several hands: with the longer time its processes wait for this one."""
 
@@ -72,7 +74,7 @@ class Daemon:
 
     def run(self) -> None:
         """Watch until SIGTERM or SIGINT."""
-        sys.setswitchinterval(_TURN)
+        sys.setswitchinterval(_SWITCH)
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
             signal.signal(number, self._on_signal)
         self._parts.start()
@@ -120,7 +122,10 @@ class Daemon:
             self._settled.extendleft(reversed(fresh))
         else:
             self._settled.extend(fresh)
+        end = time.monotonic() + _LONGEST_TURN
         for _ in range(min(_AT_ONCE, len(self._settled))):
+            if self._stopping or time.monotonic() > end:
+                break
             self._reception.judge(self._settled[0])
             self._settled.popleft()  # only now: when the state cannot be used, it has its turn again
         if not self._settled or 0 < len(fresh) <= _AT_ONCE:
@@ -190,6 +195,8 @@ class Daemon:
         watcher.refresh()
         there = set()
         for found in watcher.scan():
+            if self._stopping:
+                return
             there.add(found.path)
             settling.observe(found.path, found.size, found.mtime_ns, time.monotonic())
         settling.only(there)
