@@ -255,14 +255,14 @@ def test_doctor_names_what_is_wrong_with_the_cure(site: Site) -> None:
     for part in (
         "gliders.bruce: no folder bruce/from-glider below the roots -> wait for",
         f".cac is missing for {len(FILES)} files",
-        "mail did not take a test message: mail server 127.0.0.1:1:",
+        "mail cannot be used: mail server 127.0.0.1:1:",
         "service: does not run -> systemctl start gliderwatch",
     ):
         assert part in flat
     assert max(map(len, done.stdout.splitlines())) <= 80
     told = json.loads(command("doctor", "-c", site.config, "--json", PATH=NOWHERE).stdout)
     assert told["result"] == "errors"
-    assert {f["topic"] for f in told["findings"] if f["level"] == "error"} == {"caches"}
+    assert {f["topic"] for f in told["findings"] if f["level"] == "error"} == {"caches", "channels"}
     assert all(f["cure"] for f in told["findings"] if f["level"] in {"warning", "error"})
 
 

@@ -279,6 +279,19 @@ def test_sensors_that_are_left_out(
 
 
 @pytest.mark.real
+def test_a_real_glider_in_a_folder_of_another_name(shared_data: Path, tmp_path: Path) -> None:
+    """The folder of maria holds the files of maria-997: with that name alone nothing would be taken."""
+    mission = shared_data / "maria-2022"
+    folders = f"{{roots: [{mission}], cache: [{mission / 'cache'}]}}"
+    config = tmp_path / "c.yml"
+    paths = f"{{paths: [{mission / 'from-glider'}]}}"
+    config.write_text(f"dockserver: {folders}\nstate: {{path: s.sqlite}}\ngliders: {{maria: {paths}}}\n")
+    (told,) = (f for f in doctor.examine(config) if f.topic == "files" and f.level == Level.ERROR)
+    assert told.text.startswith("69 files in the folder of maria are of maria-997")
+    assert "name the glider maria-997" in told.cure
+
+
+@pytest.mark.real
 def test_sensors_that_a_real_glider_leaves_out(shared_data: Path, tmp_path: Path) -> None:
     """Depth, pitch, roll and current are in its files: of these nothing is said."""
     mission = shared_data / "maria-2022"
@@ -419,6 +432,16 @@ def test_a_test_message_goes_through_each_channel_only_when_asked(
 
     monkeypatch.setattr(service.Channel, "send", refuse)
     assert one(examined(send=True), Level.ERROR, "channels", "550 no")
+
+
+def test_the_server_of_a_mail_channel_is_asked_without_sending(
+    examined: Doctor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sent: list[str] = []
+    monkeypatch.setattr(service.Channel, "send", lambda self, alert: sent.append(self.name))
+    text = TEXT.replace("json://127.0.0.1:1/x", "'mailto://127.0.0.1:9?from=a@b.org&to=c@d.org'")
+    assert one(examined(text), Level.ERROR, "channels", "hook cannot be used: mail server 127.0.0.1:9")
+    assert sent == []
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import threading
 from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
-from gliderwatch.alerts.smtp import PARTLY, DeliveryError, envelope_of, first, is_permanent, submit
+from gliderwatch.alerts.smtp import PARTLY, DeliveryError, envelope_of, first, is_permanent, reach, submit
 from gliderwatch.model import Alert, Kind, Severity
 
 __all__ = ["Channel", "DeliveryError", "problem", "scrub"]
@@ -58,6 +58,20 @@ class Channel:
         """
         if self._service is None:
             self._service, _ = _service(self._url)
+
+    def reach(self) -> bool:
+        """Whether the server of a mail channel answers and lets us in; nothing is sent.
+
+        False of other services: there is no asking without a message. Raises DeliveryError.
+        """
+        self.prepare()
+        if not _is_mail(self._service):
+            return False
+        try:
+            reach(self._service)
+        except DeliveryError as error:
+            raise DeliveryError(scrub(str(error), self._url)) from None
+        return True
 
     def send(self, alert: Alert) -> None:
         """Deliver one alert; raises DeliveryError unless it surely was."""

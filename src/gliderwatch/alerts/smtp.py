@@ -5,7 +5,8 @@ from __future__ import annotations
 import smtplib
 import socket
 import ssl
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from email.errors import MessageError
 from typing import Any
 
@@ -48,22 +49,36 @@ def submit(
     service: Any, alert: Alert, envelope: Envelope, recipients: list[str]
 ) -> dict[str, tuple[int, bytes]]:
     """Hand the mail to the server; returns who was refused. Raises DeliveryError when nobody was served."""
-    server = f"mail server {service.smtp_host}:{service.port}"
     try:
         mail = compose(alert, envelope)
     except (ValueError, MessageError) as error:
         raise DeliveryError(f"cannot be written as a mail: {error}", permanent=True) from None
+    with _session(service) as smtp:
+        try:
+            return smtp.send_message(mail, envelope.sender[1], recipients)
+        except smtplib.SMTPRecipientsRefused as error:
+            return error.recipients
+
+
+def reach(service: Any) -> None:
+    """Connect to the server and log in, and send nothing. Raises DeliveryError where that cannot be done."""
+    with _session(service):
+        pass
+
+
+@contextmanager
+def _session(service: Any) -> Iterator[smtplib.SMTP]:
+    """A connection; what goes wrong with it inside is raised as DeliveryError."""
+    server = f"mail server {service.smtp_host}:{service.port}"
     try:
         smtp = _connect(service)
         try:
-            return smtp.send_message(mail, envelope.sender[1], recipients)
+            yield smtp
         finally:
             # once the server took the message, a lost goodbye must not send it again
             with suppress(OSError, smtplib.SMTPException):
                 smtp.quit()
             smtp.close()
-    except smtplib.SMTPRecipientsRefused as error:
-        return error.recipients
     except smtplib.SMTPDataError as error:
         reason = f"{server}: {error.smtp_code} {_decode(error.smtp_error)}"
         raise DeliveryError(reason, permanent=is_permanent(error.smtp_code)) from None

@@ -36,6 +36,7 @@ def examine(path: Path, *, send: bool = False) -> Iterator[Finding]:
     yield from _safely("inotify", lambda: machine.inotify(config))
     files = data.Inventory()
     yield from _safely("files", lambda: _counted(config, files))
+    yield from _safely("files", lambda: data.names(config, files))
     yield from _safely("caches", lambda: data.caches(config, files))
     yield from _safely("sensors", lambda: data.sensors(config, files))
     yield from _safely("clock", lambda: machine.clock(files.newest))

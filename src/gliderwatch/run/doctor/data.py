@@ -58,13 +58,17 @@ USEFUL = {
 
 @dataclass(slots=True)
 class Inventory:
-    """What is there: files by glider folder, headers that could be read, and what could not be."""
+    """What is there: files by glider folder, headers that could be read, and what could not be.
+
+    ``strangers`` counts files by their folder and the glider that their header names, where that is not
+    configured."""
 
     found: int = 0
     is_cut: bool = False
     newest: dict[Path, float] = field(default_factory=dict)
     headers: dict[Path, Header] = field(default_factory=dict)
     unreadable: list[str] = field(default_factory=list)
+    strangers: Counter[tuple[str, str]] = field(default_factory=Counter)
 
 
 def take_stock(config: Config, made: Inventory) -> None:
@@ -83,10 +87,21 @@ def take_stock(config: Config, made: Inventory) -> None:
         made.newest[newest[0].path] = newest[0].mtime_ns / 1e9
         for file in newest:
             try:
-                made.headers[file.path] = read_header(file.path)
+                header = made.headers[file.path] = read_header(file.path)
             except GliderwatchError as problem:
                 made.unreadable.append(f"{file.path}: {problem}")
+            else:
+                if header.id.glider not in config.gliders:
+                    made.strangers[file.glider_folder, header.id.glider] += 1
     made.unreadable += closed
+
+
+def names(config: Config, files: Inventory) -> Findings:
+    """Files in the folder of a glider that is configured, of which the headers say another name."""
+    for (folder, glider), n in sorted(files.strangers.items()):
+        if folder in config.gliders:
+            text = f"{n} files in the folder of {folder} are of {glider}, as they say themselves: not taken"
+            yield error("files", text, f"name the glider {glider} in `gliders`, with the folder as `paths`")
 
 
 def caches(config: Config, files: Inventory) -> Findings:

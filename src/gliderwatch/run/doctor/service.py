@@ -63,7 +63,7 @@ def state(config: Config, problems: Iterable[Problem]) -> Findings:
 
 
 def channels(config: Config, problems: Iterable[Problem], send: bool) -> Findings:
-    """Whether channels can be used and do deliver; with `send`, a test message goes through each."""
+    """Whether channels can be reached and do deliver; with `send`, a test message goes through each."""
     found = of_check("channels", problems, "channels", "recipients")
     yield from found
     bad = {f.text.split(".")[1] for f in found if ": channels." in f.text and f.level == Level.ERROR}
@@ -72,9 +72,10 @@ def channels(config: Config, problems: Iterable[Problem], send: bool) -> Finding
         trouble = waiting.get(name)
         if name in bad:
             continue
-        refused = try_channel(config, name) if send else None
+        said, refused = ("took a test message", try_channel(config, name)) if send else _reached(config, name)
         if refused is not None:
-            yield error("channels", f"{name} did not take a test message: {refused}", "compare its URL")
+            cure = "compare its URL; can this machine reach the server?"
+            yield error("channels", f"{name} cannot be used: {refused}", cure)
         elif trouble is not None:
             late = duration(max(0.0, time.time() - trouble.since))
             text = (
@@ -82,7 +83,7 @@ def channels(config: Config, problems: Iterable[Problem], send: bool) -> Finding
             )
             yield warning("channels", text, f"gliderwatch test-alert --channel {name}")
         else:
-            yield ok("channels", f"{name} took a test message" if send else f"{name} can be used")
+            yield ok("channels", f"{name} {said}")
 
 
 def sign(config: Config) -> Findings:
@@ -123,6 +124,15 @@ def try_channel(config: Config, name: str) -> str | None:
     except (DeliveryError, ConfigError) as problem:
         return str(problem)
     return None
+
+
+def _reached(config: Config, name: str) -> tuple[str, str | None]:
+    """What is known of a channel to which nothing is sent, and why it cannot be used (None: it can)."""
+    try:
+        answers = Channel(name, config.channel_url(name).get_secret_value()).reach()
+    except (DeliveryError, ConfigError) as problem:
+        return "", str(problem)
+    return "has a server that answers" if answers else "has a good URL (tried only with --send)", None
 
 
 def daemon(config: Config) -> Findings:
