@@ -56,7 +56,7 @@ def pattern(where: Path) -> Pattern:
     mission = simulate(Scenario(seed=4, glider="bruce", days=3.0, faults=(fault,)))
     paths = write_mission(where / "gliders", where / "cache", mission)
     with_state = where / "pattern.sqlite"
-    store = Store.open(with_state, durable=False)
+    store = Store.open(with_state)
     for path in paths:
         segment = decode(path, [where / "cache"])
         file = File(str(path), 1, 1, Status.WAITING, "bruce", segment.id.name)

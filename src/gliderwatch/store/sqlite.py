@@ -42,8 +42,13 @@ class Store:
 
     @classmethod
     def open(cls, path: Path | str, *, durable: bool = True) -> Store:
-        """The store at a path, made if need be; `durable` as in `database.connect`. Raises StateError."""
-        return cls(connect(path, durable=durable), path)
+        """The store at a path, made if need be; `durable` as in `database.connect`. Raises StateError.
+
+        Where it is not, few checkpoints are written: what can be run again comes in the order of time.
+        """
+        store = cls(connect(path, durable=durable), path)
+        store._following = 0 if durable else RECENT
+        return store
 
     @classmethod
     def reading(cls, path: Path) -> Store:
