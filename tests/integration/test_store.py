@@ -1,11 +1,13 @@
 """The state file: all or nothing, versions, what may be written twice and what may not."""
 
+import gzip
 import sqlite3
 import subprocess
 import sys
 import zlib
 from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +26,7 @@ from gliderwatch.store.outbox import Outbox
 from gliderwatch.store.sqlite import File, Status, Store
 from missions import Leg, cut, ending, feed, mission
 
+FIRST = Path(__file__).parents[1] / "golden" / "schema-1.sqlite.gz"
 LEGS = [Leg(heading=0.5 * k) for k in range(6)]
 
 
@@ -109,6 +112,24 @@ class TestOpening:
         assert ending(store, "unit") == ending(feed(made), "unit")
         assert store.expected("unit", 1e12) == feed(made).expected("unit", 1e12)
         assert [row.alert for row in Outbox(path).due(1e9)] == [waits], "held by nothing"
+
+    def test_a_state_file_that_the_first_release_wrote_is_gone_on_from(self, path):
+        """By the daemon of 0.1.0 (schema 1) of a simulated remora, its mail still undelivered."""
+        path.parent.mkdir()
+        path.write_bytes(gzip.decompress(FIRST.read_bytes()))
+        with sqlite3.connect(path) as db:
+            assert db.execute("PRAGMA user_version").fetchone() == (1,)
+        store = Store.open(path)
+        (before,) = store.incidents("sim")
+        assert [row.alert.incident for row in Outbox(path).due(2e9)] == [before.id]
+        _, identities = store.resume(SegmentId(float("-inf"), "sim", ""))
+        made = [store.segment(identity) for identity in identities]
+        fuller = replace(made[-1], completeness=(9, 10**6, ""))
+        feed([fuller], store=store)
+        assert ending(store, "sim") == ending(feed([*made[:-1], fuller]), "sim")
+        (after,) = store.incidents("sim")
+        assert after.opened_at < before.opened_at, "today's estimator sees it sooner"
+        assert len(made) == 31
 
     def test_a_migration_that_fails_changes_nothing(self, store, path, monkeypatch):
         store.close()
