@@ -48,19 +48,20 @@ class Config(Section):
     metrics: Metrics = Field(default=Metrics(), description="For Prometheus.")
     _document: Document = PrivateAttr(Document(Path("configuration"), None, {}))
     _presets: Mapping[str, Preset] = PrivateAttr(default_factory=dict)
+    _known: dict[str, Settings] = PrivateAttr(default_factory=dict)
 
     def glider(self, name: str) -> GliderParams:
         """Parameters of a glider: built-in < preset < defaults < its own; defaults for an unknown one."""
-        return self._resolve(self.gliders.get(name.lower(), Glider()))
+        return self._of(name).params()
 
     def attention(self, name: str) -> Attention:
         """How the silence of a glider is taken."""
         glider = self.gliders.get(name.lower(), Glider())
-        return Attention(self._settings(glider).overdue_hours, glider.muted_until, glider.recovered)
+        return Attention(self._of(name).overdue_hours, glider.muted_until, glider.recovered)
 
     def defaults_params(self) -> GliderParams:
         """Parameters of a glider that has no settings of its own."""
-        return self._resolve(Glider())
+        return self._settings(Glider()).params()
 
     def locate(self, key: str) -> int:
         """The line of a dotted key (`channels.mail.url`, `dockserver.roots.0`) in the file."""
@@ -69,7 +70,7 @@ class Config(Section):
     def bound_to(self, document: Document, presets: Mapping[str, Preset]) -> Config:
         """The same settings, knowing their file and the presets."""
         bound = self.model_copy()
-        bound._document, bound._presets = document, presets
+        bound._document, bound._presets, bound._known = document, presets, {}
         return bound
 
     @property
@@ -89,8 +90,14 @@ class Config(Section):
             raise ConfigError(f"{self._document.path}:{self.locate(key)}: {key}: {error}") from None
         return SecretStr(url)
 
-    def _resolve(self, glider: Glider) -> GliderParams:
-        return self._settings(glider).params()
+    def _of(self, name: str) -> Settings:
+        """The settings of a glider, put together once: they are asked for with every file."""
+        name = name.lower()
+        if name not in self.gliders:
+            return self._settings(Glider())
+        if name not in self._known:
+            self._known[name] = self._settings(self.gliders[name])
+        return self._known[name]
 
     def _settings(self, glider: Glider) -> Settings:
         preset = self._presets.get(glider.preset or self.defaults.preset or "", Preset())
