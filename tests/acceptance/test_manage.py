@@ -122,19 +122,29 @@ def test_nobody_is_reminded_of_what_somebody_took_on(site: Site, taken_on: bool)
 def test_a_mute_is_heeded_by_the_running_service_and_ends_with_unmute(site: Site) -> None:
     with mail_server() as box:
         site.configure("bruce", url=box.url)
-        with Daemon(site) as daemon:
+        with Daemon(site, WATCHDOG_USEC="1000000") as daemon:  # a beat each half second
             put(site, files()[0])
             muted = command("mute", "bruce", "--hours", "2", "-c", site.config)
             assert muted.returncode == 0, muted.stderr
-            put(site, *files()[1:-1])
+            put(site, *files()[1:])
             assert "muted until" in command("status", "-c", site.config).stdout
             assert site.status()["gliders"]["bruce"]["muted_until"] is not None
             assert daemon.log("alert") == []
             assert json.loads(command("incidents", "-c", site.config, "--json").stdout)
             assert command("unmute", "bruce", "-c", site.config).returncode == 0
-            put(site, files()[-1])
-            until(lambda: box.mails, "the incident that is open is told")
+            until(lambda: box.mails, "the incident that is open is told, without another file")
             assert site.status()["gliders"]["bruce"]["muted_until"] is None
+
+
+def test_what_is_open_is_told_when_a_mute_ends_by_itself(site: Site) -> None:
+    with mail_server() as box:
+        site.configure("bruce", url=box.url)
+        with Daemon(site, WATCHDOG_USEC="1000000"):
+            put(site, files()[0])
+            assert command("mute", "bruce", "--hours", "0.0015", "-c", site.config).returncode == 0
+            put(site, *files()[1:])
+            until(lambda: box.mails, "told")
+    assert subjects(box)[0] == "ANOMALY"
 
 
 def test_a_mute_outlives_a_restart_and_a_replay_knows_nothing_of_it(site: Site, tmp_path: Path) -> None:

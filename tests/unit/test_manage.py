@@ -232,7 +232,7 @@ class TestMute:
         assert intake.next_tick(store, "electa", NOBODY, 0.0) == 100.0
         store.notes.mute("electa", 500.0, 0.0)
         assert intake.next_tick(store, "electa", NOBODY, 0.0) == 500.0
-        store.notes.unmute("electa")
+        store.notes.unmute("electa", 50.0)
         assert intake.next_tick(store, "electa", NOBODY, 0.0) == 100.0
 
     def test_is_taken_back(self, config: Config) -> None:

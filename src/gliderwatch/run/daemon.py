@@ -241,6 +241,8 @@ class Daemon:
             log.error("observer died, started again")
             watcher.restart()
             self._next_scan = time.monotonic()
+        if self._caught_up:
+            self._reception.heed_mutes(time.time())
         at_hand = len(backlog) + len(self._settled)
         is_well = self._upkeep.is_well(self._parts.dispatcher, backlog.decoding)
         self._reception.alerted(self._upkeep.beat(is_well, at_hand))

@@ -33,6 +33,7 @@ class Reception:
         self, store: Store, upkeep: Upkeep, wake: threading.Event, is_stopping: Callable[[], bool]
     ) -> None:
         self._store, self._upkeep, self._wake, self._is_stopping = store, upkeep, wake, is_stopping
+        self._heeded = time.time()
 
     def use(self, parts: Parts) -> None:
         """Work with these parts; comes before all else."""
@@ -71,6 +72,15 @@ class Reception:
     def speak_of_all(self) -> None:
         """Say what an earlier life left unsaid of any glider."""
         for glider in self._store.gliders():
+            self._speak(glider)
+
+    def heed_mutes(self, now: float) -> None:
+        """Say what there is to say of gliders whose mute has ended since the last time, by `now` (s)."""
+        since, self._heeded = self._heeded, now
+        attention = self._parts.speaking.attention
+        ends = {glider: attention(glider).muted_until for glider in self._parts.config.gliders}
+        over = {glider for glider, end in ends.items() if end is not None and since < end <= now}
+        for glider in sorted(over | set(self._store.notes.unmuted(since, now))):
             self._speak(glider)
 
     def alerted(self, alerts: tuple[Alert, ...]) -> None:

@@ -193,6 +193,6 @@ def _silence(g: GliderStatus) -> dict[str, Any]:
         "overdue_at": iso(call.due) if call is not None else None,
         "overdue": g.overdue_since is not None,
         "ended": g.is_over,
-        "muted_until": iso(muted_until) if muted_until is not None else None,
+        "muted_until": iso(muted_until) if muted_until is not None and g.is_muted else None,
         "recovered": g.attention.recovered,
     }

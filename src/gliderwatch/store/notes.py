@@ -32,9 +32,18 @@ class Notes:
         """Tell nothing of a glider until a time (s), in place of what was noted before."""
         self._db.execute("INSERT OR REPLACE INTO mutes VALUES (?, ?, ?)", (glider, until, now))
 
-    def unmute(self, glider: str) -> None:
-        """Forget a mute."""
-        self._db.execute("DELETE FROM mutes WHERE glider = ?", (glider,))
+    def unmute(self, glider: str, now: float) -> None:
+        """End a mute at a time (s)."""
+        self._db.execute("UPDATE mutes SET until = min(until, ?) WHERE glider = ?", (now, glider))
+
+    def unmuted(self, after: float, until: float) -> list[str]:
+        """The gliders whose mute by command ended `after` a time and `until` another (s)."""
+        return [
+            row[0]
+            for row in self._db.execute(
+                "SELECT glider FROM mutes WHERE until > ? AND until <= ?", (after, until)
+            )
+        ]
 
     def acknowledge(self, glider: str, ack: Ack) -> None:
         """Keep an acknowledgement, in place of an earlier one of its incident."""

@@ -60,7 +60,7 @@ def unmute(config: Config, glider: str, now: float) -> list[str]:
     name = known_glider(config, glider)
     with writing(config) as store:
         before = store.notes.muted_until(name)
-        store.notes.unmute(name)
+        store.notes.unmute(name, now)
     configured = config.attention(name)
     why = None
     if configured.recovered:
