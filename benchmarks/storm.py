@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from itertools import count
-from pathlib import Path
 
 import logbook
 
@@ -234,18 +233,12 @@ class Storm(Chaos):
         if self._is_stopped():
             yield
             return
-        process.send_signal(signal.SIGSTOP)
         self._stopped = process
-        tasks = Path(f"/proc/{process.pid}/task")
-        with suppress(AssertionError, OSError):
-            until(
-                lambda: all(") T" in (task / "stat").read_text() for task in tasks.iterdir()), "stopped", 5.0
-            )
         try:
-            yield
+            with self.daemon.stopped():
+                yield
         finally:
             self._stopped = None
-            process.send_signal(signal.SIGCONT)
 
     def _is_stopped(self) -> bool:
         return self._stopped is not None and self._stopped is self.daemon.process

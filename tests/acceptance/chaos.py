@@ -51,10 +51,10 @@ def hooked(**faults: object) -> dict[str, str]:
 
 
 def flood(folder: Path) -> None:
-    """More events of a folder than inotify keeps for one that does not read them."""
+    """Twice the events of a folder that inotify keeps for one that does not read them."""
     here, there = folder / ".one", folder / ".two"
     here.touch()
-    for _ in range(int(Path("/proc/sys/fs/inotify/max_queued_events").read_text(encoding="ascii")) // 4 + 1):
+    for _ in range(int(Path("/proc/sys/fs/inotify/max_queued_events").read_text(encoding="ascii")) // 2):
         here.rename(there)
         there.rename(here)
     here.unlink()

@@ -16,7 +16,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -318,6 +318,25 @@ class Daemon:
         whole = self.text().rpartition("\n")[0].splitlines()
         entries = (json.loads(line) for line in whole if line.startswith("{"))
         return [entry for entry in entries if re.fullmatch(event, entry["event"])]
+
+    @contextmanager
+    def stopped(self) -> Iterator[None]:
+        """Meanwhile none of its threads runs: they stop only a while after the signal was sent."""
+        process = self.process
+        assert process is not None
+        threads = Path(f"/proc/{process.pid}/task")
+
+        def stopped() -> bool:  # or dead
+            stats = [stat.read_text() for stat in threads.glob("*/stat")]
+            return all(stat.rpartition(")")[2].split()[0] in "TZX" for stat in stats)
+
+        process.send_signal(signal.SIGSTOP)
+        try:
+            with suppress(OSError):
+                until(stopped, "stopped")
+            yield
+        finally:
+            process.send_signal(signal.SIGCONT)
 
     def kill(self) -> None:
         """End it as a power cut would."""

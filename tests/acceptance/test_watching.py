@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import signal
 import sys
 import time
 from pathlib import Path
@@ -70,10 +69,9 @@ def test_what_an_overflow_lost_is_found_at_once_and_all_is_watched_from_then_on(
     with Daemon(site) as daemon:
         put(site, FILES[0])
         taken(site, FILES[0])
-        os.kill(daemon.pid, signal.SIGSTOP)
-        flood(site.folder("angus"))
-        put(site, *FILES[1:3])  # the news of them are not kept
-        os.kill(daemon.pid, signal.SIGCONT)
+        with daemon.stopped():
+            flood(site.folder("angus"))
+            put(site, *FILES[1:3])  # the news of them are not kept
         taken(site, *FILES[1:3])
         put(site, *FILES[3:])
         taken(site, *FILES[3:])
