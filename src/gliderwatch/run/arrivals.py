@@ -39,6 +39,12 @@ def observe(path: Path, settling: Settling, now: float) -> None:
     settling.observe(path, status.st_size, status.st_mtime_ns, now)
 
 
+def settle_anew(path: Path, settling: Settling, now: float) -> None:
+    """Let a file settle as if nothing were known of it; `now` is monotonic (s)."""
+    settling.forget(path)
+    observe(path, settling, now)
+
+
 def judge(
     path: Path, store: Store, caches: Sequence[Path], is_known: Callable[[str], bool]
 ) -> Job | File | None:

@@ -184,8 +184,7 @@ class Daemon:
         settling = self._parts.settling
         if arrivals.state(path) in (None, settling.passed(path)):
             return True
-        settling.forget(path)
-        arrivals.observe(path, settling, time.monotonic())
+        arrivals.settle_anew(path, settling, time.monotonic())
         return False
 
     def _scan(self) -> None:

@@ -106,21 +106,22 @@ def build(
         news,
         config.dockserver.observer,
     )
+    ocean, speaks = Ocean(config), speaking(config)
     if before is None:
         decoder = Decoder(watcher.cache_folders(), max_workers=workers)
-    else:
+    else:  # shared: what follows can no longer refuse the configuration
         decoder = before.decoder
         decoder.cache_folders = watcher.cache_folders()
     return Parts(
         config,
         news,
         workers,
-        speaking(config),
+        speaks,
         Settling(config.dockserver.settle_seconds),
         watcher,
         decoder,
         Backlog(),
         dispatcher,
-        Ocean(config),
+        ocean,
         urls,
     )

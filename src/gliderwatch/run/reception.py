@@ -108,8 +108,7 @@ class Reception:
 
     def _again(self, path: Path) -> None:
         """Let a file have its turn once more."""
-        self._parts.settling.forget(path)
-        arrivals.observe(path, self._parts.settling, time.monotonic())
+        arrivals.settle_anew(path, self._parts.settling, time.monotonic())
 
     def _take_in(self, file: File, segment: Segment) -> None:
         glider = segment.id.glider
