@@ -31,7 +31,8 @@ from gliderwatch.simulate.dockserver import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Fault, FaultKind, Scenario
 from gliderwatch.store import codec
-from gliderwatch.store.sqlite import RECENT, SPARSE, File, Status, Store
+from gliderwatch.store.segments import RECENT, SPARSE
+from gliderwatch.store.sqlite import File, Status, Store
 
 YEARS, YEAR = 5.0, 365.25 * 86400.0
 DEATH = 300.0

@@ -190,6 +190,6 @@ class Ending:
 
 def ending(store: Store, glider: str) -> Ending:
     """What the store holds of a glider, with the bytes of its last checkpoint."""
-    state, left = store.resume(SegmentId(float("inf"), glider, ""))
+    state, left = store.segments.resume(SegmentId(float("inf"), glider, ""))
     assert left == []
     return Ending(store.assessments(glider), store.incidents(glider), codec.encode(state))

@@ -6,7 +6,8 @@ from gliderwatch.errors import Quarantine
 from gliderwatch.model import SegmentId
 from gliderwatch.params import GliderParams
 from gliderwatch.run import intake
-from gliderwatch.store.sqlite import RECENT, File, Status, Store
+from gliderwatch.store.segments import RECENT, Segments
+from gliderwatch.store.sqlite import File, Status, Store
 from missions import Leg, ending, feed, mission
 
 LEGS = [Leg(heading=0.4 * k) for k in range(24)]
@@ -57,7 +58,7 @@ def test_what_was_taken_back_is_not_gone_on_from(path, monkeypatch):
     made = mission(LEGS)
     store = fed(Store.open(path), made[:10], RECENT)
     with monkeypatch.context() as patch:
-        patch.setattr(Store, "thin", lambda *_: (_ for _ in ()).throw(Quarantine("broken")))
+        patch.setattr(Segments, "thin", lambda *_: (_ for _ in ()).throw(Quarantine("broken")))
         with pytest.raises(Quarantine), store.followed_by(RECENT):
             file = File("/x", 1, 1, Status.WAITING, "unit", made[10].id.name)
             intake.take(store, file, made[10], GliderParams(), None, 0.0)

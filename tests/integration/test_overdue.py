@@ -122,7 +122,7 @@ def test_a_replay_knows_when_each_message_would_have_come(fleet) -> None:
     folder, _ = fleet
     store = replay(Request((folder / "gliders" / "angus",), (folder / "cache",))).store
     segments = of("angus", fleet)
-    expected = store.expected("angus", segments[gap(segments) - 1].last_t)
+    expected = store.known("angus").expected(segments[gap(segments) - 1].last_t)
     assert expected is not None
     margin = max(3 * HOUR, expected.t - expected.after, 3 * expected.t_sigma) + 2400
     alerts = store.alerts()
@@ -330,7 +330,7 @@ class TestQuiet:
 
     def test_hours_as_configured(self, fleet) -> None:
         live, _, due = silent(fleet, overdue_hours=0.5)
-        expected = live.store.expected("angus", live.now)
+        expected = live.store.known("angus").expected(live.now)
         assert expected is not None and due == expected.t + 0.5 * HOUR
 
     def test_an_archive_cries_no_wolf(self, fleet) -> None:

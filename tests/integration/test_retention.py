@@ -18,7 +18,8 @@ from gliderwatch.store import retention
 from gliderwatch.store.damage import damage
 from gliderwatch.store.outbox import Outbox
 from gliderwatch.store.retention import DAY, HOUR, Retention
-from gliderwatch.store.sqlite import RECENT, File, Status, Store
+from gliderwatch.store.segments import RECENT
+from gliderwatch.store.sqlite import File, Status, Store
 from missions import Leg, ending, feed, mission, opened
 
 PARAMS = GliderParams(speed_min=0.2, speed_max=0.4, speed_learnt=False)

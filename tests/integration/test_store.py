@@ -23,6 +23,7 @@ from gliderwatch.run import intake
 from gliderwatch.store import codec, damage, database
 from gliderwatch.store.database import SCHEMA
 from gliderwatch.store.outbox import Outbox
+from gliderwatch.store.segments import Segments
 from gliderwatch.store.sqlite import File, Status, Store
 from missions import Leg, cut, ending, feed, mission
 
@@ -110,7 +111,7 @@ class TestOpening:
         old.close()
         store = feed(made[-1:], store=Store.open(path))
         assert ending(store, "unit") == ending(feed(made), "unit")
-        assert store.expected("unit", 1e12) == feed(made).expected("unit", 1e12)
+        assert store.known("unit").expected(1e12) == feed(made).known("unit").expected(1e12)
         assert [row.alert for row in Outbox(path).due(1e9)] == [waits], "held by nothing"
 
     def test_a_state_file_that_the_first_release_wrote_is_gone_on_from(self, path):
@@ -122,8 +123,8 @@ class TestOpening:
         store = Store.open(path)
         (before,) = store.incidents("sim")
         assert [row.alert.incident for row in Outbox(path).due(2e9)] == [before.id]
-        _, identities = store.resume(SegmentId(float("-inf"), "sim", ""))
-        made = [store.segment(identity) for identity in identities]
+        _, identities = store.segments.resume(SegmentId(float("-inf"), "sim", ""))
+        made = [store.segments.get(identity) for identity in identities]
         fuller = replace(made[-1], completeness=(9, 10**6, ""))
         feed([fuller], store=store)
         assert ending(store, "sim") == ending(feed([*made[:-1], fuller]), "sim")
@@ -301,18 +302,21 @@ def tables(store: Store) -> dict[str, list]:
 class TestTransaction:
     """Each input leads to all of its rows or to none."""
 
-    @pytest.mark.parametrize("step", ["put", "apply", "checkpoint", "thin", "say"])
-    def test_whatever_fails_on_the_way_leaves_nothing(self, store, monkeypatch, step):
+    @pytest.mark.parametrize(
+        ("part", "step"),
+        [(Segments, "put"), (Store, "apply"), (Segments, "checkpoint"), (Segments, "thin"), (Store, "say")],
+    )
+    def test_whatever_fails_on_the_way_leaves_nothing(self, store, monkeypatch, part, step):
         speaking = intake.Speaking(channels=lambda a: ["mail"], notices=lambda g: True)
         feed(mission(LEGS)[:3], speaking=speaking, store=store)
         before = tables(store)
-        whole = getattr(Store, step)
+        whole = getattr(part, step)
 
         def breaks(self, *args):
             whole(self, *args)
             raise KeyboardInterrupt  # as of a signal, not only what an error handler would catch
 
-        monkeypatch.setattr(Store, step, breaks)
+        monkeypatch.setattr(part, step, breaks)
         with pytest.raises(KeyboardInterrupt):
             feed(mission(LEGS)[3:4], speaking=speaking, store=store)
         assert tables(store) == before
@@ -373,18 +377,18 @@ class TestLedger:
 class TestSegments:
     def test_a_segment_comes_back(self, store):
         s = mission(LEGS)[0]
-        assert store.put(s) == s.id
-        back = store.segment(s.id)
+        assert store.segments.put(s) == s.id
+        back = store.segments.get(s.id)
         assert back.id == s.id and back.get("depth").v.tolist() == s.get("depth").v.tolist()
-        assert store.completeness("unit", s.id.name) == s.completeness
-        assert store.completeness("unit", "other") is None
+        assert store.segments.completeness("unit", s.id.name) == s.completeness
+        assert store.segments.completeness("unit", "other") is None
 
     def test_dense_data_are_kept_thinned_and_lead_to_the_same(self, store):
         """4 s data, as of a file that was recovered with the glider."""
         rng = np.random.default_rng(0)
         made = [_dense(s, rng) for s in mission(LEGS[:3])]
         first = feed(made, store=store)
-        kept = store.segment(made[1].id)
+        kept = store.segments.get(made[1].id)
         assert len(kept.get("pitch")) < len(made[1].get("pitch")) / 6
         assert kept.get("fix_lat").t.tolist() == made[1].get("fix_lat").t.tolist()
         assert kept.completeness == made[1].completeness
@@ -393,31 +397,31 @@ class TestSegments:
 
     def test_a_fuller_copy_replaces_it_from_its_time_on(self, store):
         s = mission(LEGS)[2]
-        store.put(cut(s, s.id.opened_at + 3000))
-        assert store.put(s) == s.id
-        assert store.completeness("unit", s.id.name) == s.completeness
+        store.segments.put(cut(s, s.id.opened_at + 3000))
+        assert store.segments.put(s) == s.id
+        assert store.segments.completeness("unit", s.id.name) == s.completeness
         assert store.extent("unit") == (1, 0)
 
     def test_a_copy_opened_at_another_time_touches_both(self, store):
         """The clock was set between two copies."""
         s = mission(LEGS)[2]
-        store.put(s)
+        store.segments.put(s)
         later = replace(s, id=replace(s.id, opened_at=s.id.opened_at + 60))
-        assert store.put(later) == s.id
-        assert store.put(s) == s.id
+        assert store.segments.put(later) == s.id
+        assert store.segments.put(s) == s.id
 
     def test_it_goes_on_from_the_newest_checkpoint_before(self, store):
         made = mission(LEGS)
         feed(made, store=store)
-        state, todo = store.resume(made[3].id)
+        state, todo = store.segments.resume(made[3].id)
         assert todo == [s.id for s in made[3:]]
         assert state.navigation.last_t == made[2].last_t
-        assert store.resume(made[0].id) == (GliderState(), [s.id for s in made])
+        assert store.segments.resume(made[0].id) == (GliderState(), [s.id for s in made])
 
     def test_each_glider_for_itself(self, store):
         made = mission(LEGS)
         feed(made, store=store)
-        assert store.resume(SegmentId(0.0, "other", "")) == (GliderState(), [])
+        assert store.segments.resume(SegmentId(0.0, "other", "")) == (GliderState(), [])
         assert store.gliders() == ["unit"]
 
 
@@ -461,7 +465,7 @@ class TestSurfacings:
     def expect(self, store: Store, after: float, opened_at: float) -> Expected:
         made = Expected(after, after + 100.0, opened_at, 30.0, -80.0, 1.0, 0.0, 1.0, "as before")
         state = GliderState(memory=Memory(expected=made))
-        store.checkpoint(SegmentId(opened_at, "electa", f"electa-{opened_at:g}"), state)
+        store.segments.checkpoint(SegmentId(opened_at, "electa", f"electa-{opened_at:g}"), state)
         return made
 
     def test_the_last_expected_as_known_at_a_time(self, store):
@@ -475,24 +479,24 @@ class TestSurfacings:
         first = self.expect(store, 100.0, 0.0)
         self.expect(store, 200.0, 110.0)
         moved = self.expect(store, 190.0, 110.0)
-        assert store.expected("electa", 1e9) == moved
-        store.checkpoint(SegmentId(110.0, "electa", "electa-110"), GliderState())
-        assert store.expected("electa", 1e9) == first
+        assert store.known("electa").expected(1e9) == moved
+        store.segments.checkpoint(SegmentId(110.0, "electa", "electa-110"), GliderState())
+        assert store.known("electa").expected(1e9) == first
 
     def test_a_segment_is_heard_once_and_read_later(self, store):
         identity = SegmentId(100.0, "electa", "electa-1")
         store.hear(identity, None, 500.0)
-        assert store.signs("electa", 0.0) == (Sign(100.0, None, 500.0),)
+        assert store.known("electa").signs(0.0) == (Sign(100.0, None, 500.0),)
         store.hear(identity, 200.0, 900.0)
         store.hear(identity, 150.0, 950.0)
-        assert store.signs("electa", 0.0) == (Sign(100.0, 200.0, 500.0),)
-        assert store.signs("electa", 100.1) == () and store.signs("other", 0.0) == ()
+        assert store.known("electa").signs(0.0) == (Sign(100.0, 200.0, 500.0),)
+        assert store.known("electa").signs(100.1) == () and store.known("other").signs(0.0) == ()
 
     def test_the_first_surfacing_after_a_time(self, store):
         ended = [replace(SLOW, t_dive=t, t_surface=t + 50) for t in (0.0, 100.0)]
         under_way = replace(SLOW, t_dive=200.0, t_surface=250.0, reason="no fix", flag=None)
         store.apply("electa", Outcome(GliderState(), float("-inf"), (*ended, under_way), (), None))
-        assert [store.first_surfacing("electa", t) for t in (0.0, 50.0, 150.0)] == [50.0, 150.0, None]
+        assert [store.known("electa").first_surfacing(t) for t in (0.0, 50.0, 150.0)] == [50.0, 150.0, None]
 
 
 class TestMessages:

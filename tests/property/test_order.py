@@ -15,7 +15,7 @@ from gliderwatch.params import AnomalyRule, FalseAlarmRule, GliderParams, RulePa
 from gliderwatch.pipeline import digest
 from gliderwatch.rules.incident import Watches, judge
 from gliderwatch.run.intake import Speaking
-from gliderwatch.store import codec, sqlite
+from gliderwatch.store import codec, segments
 from missions import REAL, Ending, Leg, cut, ending, feed, mission, real
 
 EAGER = GliderParams(
@@ -104,8 +104,8 @@ def test_taking_back_and_going_on_comes_to_the_same_as_in_one_go(there, params):
 @pytest.fixture
 def thinned(monkeypatch):
     """Two checkpoints are kept of the newest segments, and hardly any of the older ones."""
-    monkeypatch.setattr(sqlite, "RECENT", 2)
-    monkeypatch.setattr(sqlite, "SPARSE", 3)
+    monkeypatch.setattr(segments, "RECENT", 2)
+    monkeypatch.setattr(segments, "SPARSE", 3)
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
@@ -129,7 +129,7 @@ def test_with_many_segments_old_checkpoints_go():
     """The numbers of the service."""
     store = feed(mission([Leg(hours=0.3)] * 200))
     kept = store._db.execute("SELECT count(*) FROM segments WHERE checkpoint IS NOT NULL").fetchone()[0]
-    assert sqlite.RECENT <= kept <= sqlite.RECENT + 3 * (200 - sqlite.RECENT) / sqlite.SPARSE
+    assert segments.RECENT <= kept <= segments.RECENT + 3 * (200 - segments.RECENT) / segments.SPARSE
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
@@ -175,7 +175,7 @@ def test_real_missions_in_any_order(shared_data, name, monkeypatch):
     glider = whole[0].id.glider
     shuffled = [copies[i] for i in rng.permutation(len(copies))]
     assert_same(ending(feed(shuffled, EAGER), glider), ending(feed(whole, EAGER), glider))
-    monkeypatch.setattr(sqlite, "RECENT", 8)
+    monkeypatch.setattr(segments, "RECENT", 8)
     first = whole[:48]
     early = [s for s in copies if s.id <= first[-1].id]
     newest_first = sorted(early, key=lambda s: (s.id, s.completeness), reverse=True)

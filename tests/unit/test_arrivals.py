@@ -13,6 +13,7 @@ import dinkum
 from gliderwatch.errors import MissingCache, Quarantine, Retry
 from gliderwatch.run import arrivals
 from gliderwatch.run.backlog import Job
+from gliderwatch.store.segments import Segments
 from gliderwatch.store.sqlite import File, Status, Store
 
 CRC = "0abc12ef"
@@ -171,7 +172,7 @@ def test_a_waiting_file_that_was_renamed_and_taken_then_is_done_with(
 ) -> None:
     noted(path, store)
     another = path.rename(path.with_name("another.sbd"))
-    monkeypatch.setattr(Store, "completeness", lambda self, glider, name: (0, 1, ""))
+    monkeypatch.setattr(Segments, "completeness", lambda self, glider, name: (0, 1, ""))
     assert noted(path, store).status == Status.DUPLICATE
     assert judge(path, store) is None
     another.rename(path)  # it had only been away: what is known of its segment may be less than it holds

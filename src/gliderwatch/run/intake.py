@@ -60,7 +60,7 @@ def take(
     glider = segment.id.glider
     with store.transaction():
         store.hear(segment.id, segment.last_t, now)
-        known = store.completeness(glider, segment.id.name)
+        known = store.segments.completeness(glider, segment.id.name)
         if known is not None and known >= segment.completeness:
             file = replace(file, status=Status.DUPLICATE, reason="this segment is known from a fuller copy")
             store.note(file, now)
@@ -136,20 +136,21 @@ def _run(
     stopping: Callable[[], bool],
     ocean: Field | None,
 ) -> tuple[Assessment, ...]:
-    state, todo = store.resume(store.put(segment))
+    segments = store.segments
+    state, todo = segments.resume(segments.put(segment))
     dives: dict[float, Assessment] = {}
     for identity in todo:
         if stopping():
             raise StoppedError(f"{segment.id.name} was not taken in: the daemon ends")
-        one = segment if identity == segment.id else store.segment(identity)
+        one = segment if identity == segment.id else segments.get(identity)
         outcome = _process(state, one, params, ocean)
         store.apply(identity.glider, outcome)
-        store.checkpoint(identity, outcome.state)
+        segments.checkpoint(identity, outcome.state)
         state = outcome.state
         dives = {t: a for t, a in dives.items() if t < outcome.since} | {
             a.t_dive: a for a in outcome.assessments
         }
-    store.thin(segment.id.glider)
+    segments.thin(segment.id.glider)
     return tuple(dives.values())
 
 

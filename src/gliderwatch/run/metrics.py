@@ -147,10 +147,11 @@ class Metrics:
 
 def _is_overdue(store: Store, config: Config, glider: str, now: float) -> bool:
     """As `gliderwatch status` says."""
-    expected, settings = store.expected(glider, now), config.gliders[glider]
+    known, settings = store.known(glider), config.gliders[glider]
+    expected = known.expected(now)
     if expected is None or settings.recovered:
         return False
-    call = awaited(expected, store.signs(glider, now - RECENT), now, config.attention(glider).overdue_hours)
+    call = awaited(expected, known.signs(now - RECENT), now, config.attention(glider).overdue_hours)
     return call.due <= now and now - call.heard < GONE
 
 

@@ -115,11 +115,12 @@ def overview(config: Config) -> Overview:
 
 def _glider(store: Store, name: str, config: Config, now: float) -> GliderStatus:
     segments, dives = store.extent(name)
-    latest = store.last_surfacing(name, float("inf"))
+    known = store.known(name)
+    latest = known.last_surfacing(float("inf"))
     incidents = tuple(i for i in store.incidents(name) if i.cleared_at is None)
     attention = store.notes.heeded(name, config.attention(name))
-    signs, acks = store.signs(name, now - RECENT), store.notes.acks(name)
-    expected = store.expected(name, now) or guess(signs, now)
+    signs, acks = known.signs(now - RECENT), store.notes.acks(name)
+    expected = known.expected(now) or guess(signs, now)
     call = awaited(expected, signs, now, attention.overdue_hours) if expected is not None else None
     configured = name in config.gliders
     return GliderStatus(

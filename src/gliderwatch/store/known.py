@@ -2,41 +2,52 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import sqlite3
 
 from gliderwatch.model import Assessment, Expected, Incident
 from gliderwatch.rules.silence import Sign
-
-if TYPE_CHECKING:
-    from gliderwatch.store.sqlite import Store
+from gliderwatch.store.rows import values
 
 
 class Known:
-    """`rules.announce.Known` and `rules.overdue.Known` of one glider."""
+    """`rules.announce.Known` and `rules.overdue.Known` of one glider, on the connection of its store."""
 
-    def __init__(self, store: Store, glider: str) -> None:
-        self._store, self.glider = store, glider
+    def __init__(self, connection: sqlite3.Connection, glider: str) -> None:
+        self._db, self.glider = connection, glider
 
     def incidents(self) -> tuple[Incident, ...]:
-        """All its incidents."""
-        return tuple(self._store.incidents(self.glider))
+        """All its incidents, in order of time."""
+        sql = "SELECT data FROM incidents WHERE glider = ? ORDER BY opened_at, id"
+        return tuple(values(self._db, sql, (self.glider,), Incident))
 
     def dive(self, t_dive: float) -> Assessment | None:
         """The dive that began at a time (s)."""
-        return self._store.dive(self.glider, t_dive)
+        sql = "SELECT data FROM assessments WHERE glider = ? AND t_dive = ?"
+        return next(iter(values(self._db, sql, (self.glider, t_dive), Assessment)), None)
 
     def last_surfacing(self, until: float) -> Assessment | None:
-        """The last dive that has ended with a fix and surfaced at `until` (s) or before."""
-        return self._store.last_surfacing(self.glider, until)
+        """The last dive whose end is known and not after `until` (s)."""
+        sql = (
+            "SELECT data FROM assessments WHERE glider = ? AND ended = 1 AND t_surface <= ? "
+            "ORDER BY t_surface DESC LIMIT 1"
+        )
+        return next(iter(values(self._db, sql, (self.glider, until), Assessment)), None)
 
     def expected(self, until: float) -> Expected | None:
         """What was expected after the last surfacing at `until` (s) or before."""
-        return self._store.expected(self.glider, until)
+        sql = (
+            "SELECT data FROM expected WHERE glider = ? AND after <= ? "
+            "ORDER BY after DESC, opened_at DESC LIMIT 1"
+        )
+        return next(iter(values(self._db, sql, (self.glider, until), Expected)), None)
 
     def first_surfacing(self, after: float) -> float | None:
         """The first surfacing later than `after` (s)."""
-        return self._store.first_surfacing(self.glider, after)
+        sql = "SELECT min(t_surface) FROM assessments WHERE glider = ? AND ended = 1 AND t_surface > ?"
+        found: float | None = self._db.execute(sql, (self.glider, after)).fetchone()[0]
+        return found
 
     def signs(self, since: float) -> tuple[Sign, ...]:
         """Its files that were opened at `since` (s) or later."""
-        return self._store.signs(self.glider, since)
+        sql = "SELECT opened_at, last_t, at FROM heard WHERE glider = ? AND opened_at >= ?"
+        return tuple(Sign(*row) for row in self._db.execute(sql, (self.glider, since)))

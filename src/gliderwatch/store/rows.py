@@ -5,6 +5,11 @@ from __future__ import annotations
 import sqlite3
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import TypeVar
+
+from gliderwatch.store import codec
+
+T = TypeVar("T")
 
 
 class Status(StrEnum):
@@ -55,3 +60,8 @@ def file_of(row: sqlite3.Row) -> File:
     """The row of the ledger."""
     names = ("path", "size", "mtime_ns", "glider", "segment", "reason", "crc")
     return File(status=Status(row["status"]), **{name: row[name] for name in names})
+
+
+def values(db: sqlite3.Connection, sql: str, arguments: tuple[object, ...], kind: type[T]) -> list[T]:
+    """The values in the first column of what a query finds. Raises DamagedError."""
+    return [codec.plain_decode(row[0], kind) for row in db.execute(sql, arguments)]

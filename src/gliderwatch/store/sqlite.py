@@ -3,33 +3,22 @@
 from __future__ import annotations
 
 import sqlite3
-import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
 
-from gliderwatch.model import Alert, Assessment, Expected, Incident, Segment, SegmentId
+from gliderwatch.model import Alert, Assessment, Expected, Incident, SegmentId
 from gliderwatch.navigation.quality import NOT_SURFACED
-from gliderwatch.navigation.samples import compact
-from gliderwatch.pipeline import GliderState, Outcome
+from gliderwatch.pipeline import Outcome
 from gliderwatch.rules.announce import Said, unanswered
-from gliderwatch.rules.silence import Sign
 from gliderwatch.store import codec, outbox, retention
-from gliderwatch.store.ahead import Ahead
 from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, read_only
 from gliderwatch.store.known import Known
 from gliderwatch.store.notes import Notes
-from gliderwatch.store.rows import File, Status, Undelivered, file_of
+from gliderwatch.store.rows import File, Status, Undelivered, file_of, values
+from gliderwatch.store.segments import RECENT, Segments
 
 __all__ = ["File", "Known", "Status", "Store", "Undelivered"]
-
-RECENT = 64
-"""Newest segments of a glider that all keep their checkpoint."""
-SPARSE = 16
-"""Of the older ones one in this many does. Its name decides, so that no order of arrival matters."""
-T = TypeVar("T")
 
 
 class Store:
@@ -37,8 +26,7 @@ class Store:
 
     def __init__(self, connection: sqlite3.Connection, path: Path | str = MEMORY) -> None:
         self._db, self._path = connection, path
-        self._ahead, self._following = Ahead(), 0
-        self.notes = Notes(connection)
+        self.segments, self.notes = Segments(connection), Notes(connection)
 
     @classmethod
     def open(cls, path: Path | str, *, durable: bool = True) -> Store:
@@ -47,7 +35,7 @@ class Store:
         Where it is not, few checkpoints are written: what can be run again comes in the order of time.
         """
         store = cls(connect(path, durable=durable), path)
-        store._following = 0 if durable else RECENT
+        store.segments.following = 0 if durable else RECENT
         return store
 
     @classmethod
@@ -71,9 +59,9 @@ class Store:
             try:
                 yield
                 self._db.execute("COMMIT")
-                self._ahead.commit()
+                self.segments.ahead.commit()
             except BaseException:
-                self._ahead.rollback()
+                self.segments.ahead.rollback()
                 if self._db.in_transaction:  # on a full disk SQLite may have ended it by itself
                     self._db.execute("ROLLBACK")
                 raise
@@ -85,13 +73,13 @@ class Store:
         Then nobody is told anything, and a power cut may take the last of them back, whole: their files are
         there to be taken again. What is told, or is the last, is on the disk when its transaction ends.
         """
-        self._following = files
+        self.segments.following = files
         if files:
             self._db.execute("PRAGMA synchronous = NORMAL")
         try:
             yield
         finally:
-            self._following = 0
+            self.segments.following = 0
             if files:
                 self._db.execute("PRAGMA synchronous = FULL")
 
@@ -124,98 +112,7 @@ class Store:
         row = (f.path, f.size, f.mtime_ns, f.status, f.glider, f.segment, f.reason, f.crc, now)
         self._db.execute("INSERT OR REPLACE INTO files VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
 
-    # ---------------------------------------------------------------- segments
-
-    def completeness(self, glider: str, name: str) -> tuple[int, int, str] | None:
-        """Of the copy of a segment that is held, None when there is none."""
-        row = self._db.execute(
-            "SELECT completeness FROM segments WHERE glider = ? AND name = ?", (glider, name)
-        ).fetchone()
-        return codec.plain_decode(row[0], tuple[int, int, str]) if row is not None else None
-
-    def put(self, segment: Segment) -> SegmentId:
-        """Keep a segment in place of an earlier copy; the first id in time that this touches.
-
-        What navigation would average anyway is kept as that: 4 s data would fill the state file.
-        """
-        thinned = replace(segment, quantities=compact(segment.quantities))
-        key = (segment.id.glider, segment.id.name)
-        old = self._db.execute("SELECT opened_at FROM segments WHERE glider = ? AND name = ?", key).fetchone()
-        self._db.execute(
-            "INSERT OR REPLACE INTO segments VALUES (?, ?, ?, ?, ?, NULL, ?)",
-            (
-                segment.id.glider,
-                segment.id.opened_at,
-                segment.id.name,
-                codec.plain_encode(segment.completeness),
-                codec.encode(thinned),
-                _is_milestone(segment.id.name),
-            ),
-        )
-        before = [] if old is None else [SegmentId(old[0], *key)]
-        return min([segment.id, *before])
-
-    def resume(self, first: SegmentId) -> tuple[GliderState, list[SegmentId]]:
-        """The newest state before a segment, and the ids of all segments after it, in order of time."""
-        ahead = self._ahead.before(first)
-        if ahead is not None:
-            return ahead[1], self._after(first.glider, ahead[0].opened_at, ahead[0].name)
-        self._ahead.drop(first.glider)
-        row = self._db.execute(
-            "SELECT opened_at, name, checkpoint FROM segments WHERE glider = ? AND checkpoint IS NOT NULL "
-            "AND (opened_at, name) < (?, ?) ORDER BY opened_at DESC, name DESC LIMIT 1",
-            (first.glider, first.opened_at, first.name),
-        ).fetchone()
-        if row is None:
-            return GliderState(), self._after(first.glider, float("-inf"), "")
-        return codec.decode(row[2], GliderState), self._after(first.glider, row[0], row[1])
-
-    def _after(self, glider: str, opened_at: float, name: str) -> list[SegmentId]:
-        rows = self._db.execute(
-            "SELECT opened_at, name FROM segments WHERE glider = ? AND (opened_at, name) > (?, ?) "
-            "ORDER BY opened_at, name",
-            (glider, opened_at, name),
-        )
-        return [SegmentId(row[0], glider, row[1]) for row in rows]
-
-    def segment(self, identity: SegmentId) -> Segment:
-        """A segment that is held."""
-        row = self._db.execute(
-            "SELECT segment FROM segments WHERE glider = ? AND name = ?", (identity.glider, identity.name)
-        ).fetchone()
-        return codec.decode(row[0], Segment)
-
-    def checkpoint(self, identity: SegmentId, state: GliderState) -> None:
-        """Keep the state after a segment, and the surfacing that it leads to expect."""
-        key = (identity.glider, identity.name)
-        if self._following:
-            self._ahead.keep(identity, state)
-        else:
-            self._ahead.drop(identity.glider)
-        is_kept = self._following < RECENT or _is_milestone(identity.name)
-        self._db.execute(
-            "UPDATE segments SET checkpoint = ?1 WHERE glider = ?2 AND name = ?3 "
-            "AND (?1 IS NOT NULL OR checkpoint IS NOT NULL)",
-            (codec.encode(state) if is_kept else None, *key),
-        )
-        self._db.execute("DELETE FROM expected WHERE glider = ? AND segment = ?", key)
-        if (e := state.memory.expected) is not None:
-            row = (*key, identity.opened_at, e.after, codec.plain_encode(e))
-            self._db.execute("INSERT INTO expected VALUES (?, ?, ?, ?, ?)", row)
-
-    def thin(self, glider: str) -> None:
-        """Let go of the checkpoints that are not among the `RECENT` newest, but for one in `SPARSE`."""
-        rows = self._db.execute(  # of the index alone: `milestone` lies behind the long records of its row
-            "SELECT name FROM segments WHERE glider = ?1 AND checkpoint IS NOT NULL AND (opened_at, name) < "
-            "(SELECT opened_at, name FROM segments WHERE glider = ?1 "
-            "ORDER BY opened_at DESC, name DESC LIMIT 1 OFFSET ?2)",
-            (glider, RECENT - 1),
-        ).fetchall()
-        self._db.executemany(
-            f"UPDATE segments SET checkpoint = NULL WHERE glider = ? AND name = ? "
-            f"AND milestone != {retention.FIRST}",
-            [(glider, row[0]) for row in rows if not _is_milestone(row[0])],
-        )
+    # --------------------------------------------------------------- retention
 
     def is_past(self, identity: SegmentId) -> bool:
         """Whether a segment is older than what is kept of its glider (`state.keep_days`)."""
@@ -254,57 +151,22 @@ class Store:
 
     def assessments(self, glider: str) -> list[Assessment]:
         """All of a glider, in order of time."""
-        return self._all(
-            "SELECT data FROM assessments WHERE glider = ? ORDER BY t_dive", (glider,), Assessment
+        return values(
+            self._db, "SELECT data FROM assessments WHERE glider = ? ORDER BY t_dive", (glider,), Assessment
         )
 
     def incidents(self, glider: str) -> list[Incident]:
         """All of a glider, in order of time."""
-        return self._all(
-            "SELECT data FROM incidents WHERE glider = ? ORDER BY opened_at, id", (glider,), Incident
-        )
+        return list(self.known(glider).incidents())
 
     def known(self, glider: str) -> Known:
         """What is known of a glider, for the rules."""
-        return Known(self, glider)
-
-    def dive(self, glider: str, t_dive: float) -> Assessment | None:
-        """The assessment of the dive that began at a time (s)."""
-        sql = "SELECT data FROM assessments WHERE glider = ? AND t_dive = ?"
-        return next(iter(self._all(sql, (glider, t_dive), Assessment)), None)
-
-    def last_surfacing(self, glider: str, until: float) -> Assessment | None:
-        """The last dive whose end is known and not after `until` (s)."""
-        sql = (
-            "SELECT data FROM assessments WHERE glider = ? AND ended = 1 AND t_surface <= ? "
-            "ORDER BY t_surface DESC LIMIT 1"
-        )
-        return next(iter(self._all(sql, (glider, until), Assessment)), None)
+        return Known(self._db, glider)
 
     def forecasts(self, glider: str) -> list[Expected]:
         """What was expected after each segment of a glider, in the order of the segments."""
-        return self._all(
-            "SELECT data FROM expected WHERE glider = ? ORDER BY opened_at, segment", (glider,), Expected
-        )
-
-    def expected(self, glider: str, until: float) -> Expected | None:
-        """What was expected after the last surfacing at `until` (s) or before."""
-        sql = (
-            "SELECT data FROM expected WHERE glider = ? AND after <= ? "
-            "ORDER BY after DESC, opened_at DESC LIMIT 1"
-        )
-        return next(iter(self._all(sql, (glider, until), Expected)), None)
-
-    def first_surfacing(self, glider: str, after: float) -> float | None:
-        """The first surfacing later than `after` (s)."""
-        sql = "SELECT min(t_surface) FROM assessments WHERE glider = ? AND ended = 1 AND t_surface > ?"
-        found: float | None = self._db.execute(sql, (glider, after)).fetchone()[0]
-        return found
-
-    def signs(self, glider: str, since: float) -> tuple[Sign, ...]:
-        """The files of a glider that were opened at `since` (s) or later."""
-        sql = "SELECT opened_at, last_t, at FROM heard WHERE glider = ? AND opened_at >= ?"
-        return tuple(Sign(*row) for row in self._db.execute(sql, (glider, since)))
+        sql = "SELECT data FROM expected WHERE glider = ? ORDER BY opened_at, segment"
+        return values(self._db, sql, (glider,), Expected)
 
     def gliders(self) -> list[str]:
         """The gliders of which segments are held."""
@@ -355,7 +217,7 @@ class Store:
         """
         going_on = frozenset[str]()
         if not quiet:
-            incidents, acks = tuple(self.incidents(glider)), self.notes.acks(glider)
+            incidents, acks = self.known(glider).incidents(), self.notes.acks(glider)
             going_on = unanswered(self.said(glider), incidents, acks)
         outbox.withdraw(self._db, glider, going_on, now)
         return going_on
@@ -366,7 +228,7 @@ class Store:
 
     def alerts(self) -> list[Alert]:
         """All messages, in the order in which they were made."""
-        return self._all("SELECT data FROM alerts ORDER BY rowid", (), Alert)
+        return values(self._db, "SELECT data FROM alerts ORDER BY rowid", (), Alert)
 
     def undelivered(self) -> list[Undelivered]:
         """What waits in the outbox, oldest first."""
@@ -375,11 +237,3 @@ class Store:
     def refused(self, since: float) -> list[Undelivered]:
         """What a channel refused for good, or could not be read, since a time (s); oldest first."""
         return outbox.refused(self._db, since)
-
-    def _all(self, sql: str, values: tuple[object, ...], kind: type[T]) -> list[T]:
-        return [codec.plain_decode(row[0], kind) for row in self._db.execute(sql, values)]
-
-
-def _is_milestone(name: str) -> bool:
-    """Whether the checkpoint of a segment is kept for good."""
-    return zlib.crc32(name.encode()) % SPARSE == 0

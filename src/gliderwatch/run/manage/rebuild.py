@@ -121,11 +121,11 @@ def _turn(step: tuple[SegmentId, Job | None]) -> tuple[SegmentId, int, str]:
 
 def _fuller(work: _Work, identity: SegmentId) -> Segment | None:
     """The segment held, if it holds more than the files that are still there."""
-    there = work.new.completeness(identity.glider, identity.name)
-    held = work.old.completeness(identity.glider, identity.name)
+    there = work.new.segments.completeness(identity.glider, identity.name)
+    held = work.old.segments.completeness(identity.glider, identity.name)
     if held is None or (there is not None and there >= held):
         return None
-    return work.old.segment(identity)
+    return work.old.segments.get(identity)
 
 
 def _take(work: _Work, file: File, segment: Segment | GliderwatchError, following: int, ocean: Ocean) -> None:
