@@ -142,7 +142,7 @@ def main() -> int:
             server.stop()
     arrived = [m["Subject"] for m in mailbox.mails if HURT in m["Subject"]]
     false = [m["Subject"] for m in mailbox.mails if WELL in m["Subject"]]
-    console.rule(f"{len(arrived)} mails about {HURT}, {len(false)} about {WELL}, which is well")
+    console.rule(f"mails about {HURT}: {len(arrived)}; about {WELL}, which is well: {len(false)}")
     return 0 if arrived and not false else 1
 
 
