@@ -9,6 +9,7 @@ import pytest
 
 from gliderwatch.model import Dive, Segment
 from gliderwatch.navigation.dives import LONGEST, Navigation, extend
+from gliderwatch.navigation.samples import concatenated
 from gliderwatch.navigation.track import closure
 from missions import LAT, LON, START, Leg, cut, mission, opened, segment, series
 
@@ -152,7 +153,8 @@ class TestUnusable:
         s = mission(LEGS)[0]
         end = START + 180 + 7200
         late = fixes(s, (START + 30, 0.0), (START + 90, 0.0), (end + 9000, 3.0), (end + 9030, 3.0))
-        _, (dive,) = told([replace(late, last_t=end + 9100)])
+        depth = concatenated(late.quantities, {"depth": series([(end + 60, 0.4)])})
+        _, (dive,) = told([replace(late, quantities=depth, last_t=end + 9100)])
         assert dive.reason == "mostly surface drift"
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -63,6 +64,23 @@ def find_flight(samples: Samples, after: float, before: float) -> Flight | None:
         return None
     evidence = " and ".join(name for name, t in told.items() if len(t))
     return Flight(float(times.min()), float(times.max()), evidence)
+
+
+def lengthened(
+    flight: Flight, samples: Samples, before: float, holes: Iterable[tuple[float, float]]
+) -> Flight:
+    """The flight until the glider is at the surface again, if the files hold only its beginning.
+
+    Some tell of every third yo only. Where for longer than `DENIES` after what was seen there is no depth
+    (pitch, where depth is not sent) and no position, the flight goes on to the first of them: at the surface
+    a glider tells its position at once. Where a whole file is missing (``holes``, s) that cannot be said.
+    """
+    told = "depth" if len(get(samples, "depth").between(flight.start, before)) else "pitch"
+    times = np.concatenate([get(samples, told).t, get(samples, "fix_lat").t])
+    end = float(np.min(times[times > flight.end], initial=before))
+    if end - flight.end <= DENIES or any(a < end and b > flight.end for a, b in holes):
+        return flight
+    return replace(flight, end=end)
 
 
 def _mostly_steep(pitch: Series) -> Array:
