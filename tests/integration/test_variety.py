@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from gliderwatch.estimation.speed import NOT_FLOWN
 from gliderwatch.ingest.decode import decode
-from gliderwatch.model import Assessment, Segment
+from gliderwatch.model import Assessment, Segment, Series, readonly
 from gliderwatch.simulate.dockserver import write_mission
 from gliderwatch.simulate.glider import simulate
-from gliderwatch.simulate.scenario import Mission, Scenario
+from gliderwatch.simulate.scenario import Fault, FaultKind, Mission, Scenario
 from gliderwatch.simulate.sensors import CADENCE
 from missions import feed
 
@@ -52,3 +54,32 @@ def test_every_third_yo_tells_the_speed_as_well_as_all(tmp_path: Path) -> None:
     assert {a.flag for a in found} == {0}
     assert np.abs(errors(mission, found)).max() < 0.012
     assert max(a.evidence["drift_h"] for a in found) < 0.1
+
+
+def commanded(segments: Sequence[Segment], off: float, since: float) -> list[Segment]:
+    """The segments without measured headings; the commanded ones are `off` (rad) since a time (s)."""
+    out = []
+    for segment in segments:
+        held = {name: s for name, s in segment.quantities.items() if not name.startswith("heading")}
+        t, v = segment.get("heading").t, segment.get("heading").v
+        held["heading_commanded"] = Series(t, readonly((v + np.where(t < since, 0.0, off)) % (2 * np.pi)))
+        out.append(replace(segment, quantities=held))
+    return out
+
+
+def test_a_commanded_heading_that_is_not_flown_is_no_false_alarm(tmp_path: Path) -> None:
+    """What is not measured cannot be wrong. With measured headings the same is flag 2."""
+    mission = simulate(Scenario(days=2.5))
+    fixed = mission.truth[10].t_dive - 60
+    found = assessed(commanded(decoded(mission, tmp_path), 0.6, fixed))
+    assert {(a.flag, a.reason) for a in found if a.t_dive < fixed} == {(0, "")}
+    assert {(a.flag, a.reason) for a in found if a.t_dive > fixed} == {(None, NOT_FLOWN)}
+    assert {a.evidence["heading_commanded"] for a in found} == {1.0}
+
+
+def test_a_slow_glider_is_told_by_commanded_headings_too(tmp_path: Path) -> None:
+    onset = Scenario().start + 2 * 86400
+    mission = simulate(Scenario(days=3.0, faults=(Fault(FaultKind.REMORA, onset, 4.0),)))
+    found = assessed(commanded(decoded(mission, tmp_path), 0.0, onset))
+    assert {a.flag for a in found if a.t_surface < onset} == {0}
+    assert {a.flag for a in found if a.t_dive > onset} == {1}

@@ -73,7 +73,7 @@ def prepare(segment: Segment, declination: float) -> Samples:
     Keys: ``fix_lat, fix_lon, dr_lat, dr_lon`` (degrees), ``heading_e, heading_n`` (unit vectors;
     the commanded heading where the measured one is absent), ``pitch, roll`` (rad), ``depth`` (m),
     ``speed_onboard`` (m/s), ``dr_state``, ``dr_time`` (s), ``thruster_on`` (0 to 1), ``vacuum`` (Pa),
-    ``ballast``, ``oil_volume`` (m3).
+    ``ballast``, ``oil_volume`` (m3); ``commanded``, 1 at each heading that is a commanded one.
     """
     source = "heading" if len(segment.get("heading")) else "heading_commanded"
     wanted = (*_KEPT, source, *(name for pair in _PAIRS for name in pair))
@@ -85,6 +85,8 @@ def prepare(segment: Segment, declination: float) -> Samples:
     heading = given.get(source, EMPTY)
     vectors = magnetic_to_true(heading_vectors(heading.v), declination)
     _add(out, ("heading_e", "heading_n"), heading.t, vectors)
+    if source == "heading_commanded" and len(heading):
+        out["commanded"] = Series(heading.t, readonly(np.ones(len(heading))))
     return MappingProxyType(out)
 
 
