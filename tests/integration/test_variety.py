@@ -10,7 +10,7 @@ import numpy as np
 
 from gliderwatch.estimation.speed import NOT_FLOWN
 from gliderwatch.ingest.decode import decode
-from gliderwatch.model import Assessment, Segment, Series, readonly
+from gliderwatch.model import Assessment, Kind, Segment, Series, readonly
 from gliderwatch.simulate.dockserver import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Fault, FaultKind, Mission, Scenario
@@ -83,3 +83,23 @@ def test_a_slow_glider_is_told_by_commanded_headings_too(tmp_path: Path) -> None
     found = assessed(commanded(decoded(mission, tmp_path), 0.0, onset))
     assert {a.flag for a in found if a.t_surface < onset} == {0}
     assert {a.flag for a in found if a.t_dive > onset} == {1}
+
+
+def test_a_glider_that_surfaces_every_half_hour_learns_what_is_normal(tmp_path: Path) -> None:
+    """Without a range of its own it was held against 0.15 to 0.75 m/s, and its alarm came and went."""
+    onset = Scenario().start + 86400
+    scenario = Scenario(
+        days=1.4,
+        depths=(2.0, 12.0),
+        interval=1800.0,
+        communications=(300.0, 600.0),
+        faults=(Fault(FaultKind.REMORA, onset, 3.0),),
+    )
+    store = feed(decoded(simulate(scenario), tmp_path))
+    found = store.assessments("sim")
+    assert {a.flag for a in found if a.t_surface < onset} == {0}
+    assert {a.speed_min for a in found[:8]} == {0.15}
+    assert all(0.19 < a.speed_min < 0.21 for a in found[16:])
+    (incident,) = store.incidents("sim")
+    assert incident.kind == Kind.ANOMALY and incident.cleared_at is None
+    assert incident.opened_at < onset + 2 * 3600

@@ -231,5 +231,6 @@ def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: S
         state = replace(state, ratios=learn_ratios(state.ratios, dive.evidence, own[0]))
     if params.learning is None or info.told is not None:
         return state
-    hours = dive.evidence.get("duration_h", 0.0)
-    return replace(state, normal=learn(state.normal, info.estimate.speed, at, hours, params.learning))
+    hours, before = dive.evidence.get("duration_h", 0.0), state.joint.dives - 1 if state.joint else 0
+    normal = learn(state.normal, info.estimate.speed, at, hours, params.learning, before)
+    return replace(state, normal=normal)
