@@ -103,3 +103,19 @@ def test_a_glider_that_surfaces_every_half_hour_learns_what_is_normal(tmp_path: 
     (incident,) = store.incidents("sim")
     assert incident.kind == Kind.ANOMALY and incident.cleared_at is None
     assert incident.opened_at < onset + 2 * 3600
+
+
+def only(segments: Sequence[Segment], *names: str) -> list[Segment]:
+    """The segments with the quantities that begin with one of `names`."""
+    return [
+        replace(s, quantities={n: q for n, q in s.quantities.items() if n.startswith(names)})
+        for s in segments
+    ]
+
+
+def test_positions_alone_tell_of_dives_and_why_nothing_is_said_of_them(tmp_path: Path) -> None:
+    """A glider of which nothing was said at all looked as well as a healthy one."""
+    mission = simulate(Scenario(days=1.0))
+    found = assessed(only(decoded(mission, tmp_path), "fix_"))
+    assert len(found) == len(mission.truth)
+    assert all(a.flag is None and a.reason.startswith("no heading for ") for a in found)

@@ -13,8 +13,8 @@ from types import MappingProxyType
 
 from gliderwatch.model import Dive, Fix, Segment
 from gliderwatch.navigation.current import Known, Report, new_reports, pair, updated
-from gliderwatch.navigation.fixes import FASTEST, distance, new_fixes
-from gliderwatch.navigation.flight import SPARSE, Flight, find_flight, lengthened
+from gliderwatch.navigation.fixes import FASTEST, SUSPECT, distance, new_fixes
+from gliderwatch.navigation.flight import SPARSE, Flight, find_flight, lengthened, unseen
 from gliderwatch.navigation.quality import flight_notes, heading_gap, segment_notes, why_unusable
 from gliderwatch.navigation.samples import Samples, after, concatenated, get, prepare
 from gliderwatch.navigation.track import attitude, build_track, evidence
@@ -150,6 +150,8 @@ def _flight_since(state: Navigation, samples: Samples, end: Fix | None) -> Fligh
     if flight is None and state.fix is not None:
         hidden = [(a, min(b, last)) for a, b in state.holes if min(b, last) - a >= HIDING]
         flight = Flight(*hidden[-1], evidence="missing") if hidden else None
+    if flight is None and end is not None and state.fix is not None and last - first >= HIDING:
+        flight = unseen(samples, first, last) if distance(state.fix, end) > SUSPECT else None
     return flight
 
 

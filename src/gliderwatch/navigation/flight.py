@@ -83,6 +83,14 @@ def lengthened(
     return replace(flight, end=end)
 
 
+def unseen(samples: Samples, after: float, before: float) -> Flight | None:
+    """All of the time between two positions where the files tell nothing of it: there may be a whole dive."""
+    told = ("depth", "pitch", "heading_e", "dr_state", "dr_time")
+    if any(len(get(samples, name).between(after, before)) for name in told):
+        return None
+    return Flight(after, before, "nothing")
+
+
 def _mostly_steep(pitch: Series) -> Array:
     """Times of steep pitches, none where most of those between them are flat: a glider in waves."""
     steep = np.abs(pitch.v) > DIVING_PITCH
