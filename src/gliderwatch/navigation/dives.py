@@ -147,11 +147,11 @@ def _flight_since(state: Navigation, samples: Samples, end: Fix | None) -> Fligh
     if not DIP < last - first <= LONGEST:
         return None
     flight = find_flight(samples, first, last)
-    if flight is None and state.fix is not None:
+    if flight is None and state.fix is not None and (end is None or distance(state.fix, end) > SUSPECT):
         hidden = [(a, min(b, last)) for a, b in state.holes if min(b, last) - a >= HIDING]
         flight = Flight(*hidden[-1], evidence="missing") if hidden else None
-    if flight is None and end is not None and state.fix is not None and last - first >= HIDING:
-        flight = unseen(samples, first, last) if distance(state.fix, end) > SUSPECT else None
+        if flight is None and end is not None and last - first >= HIDING:
+            flight = unseen(samples, first, last)
     return flight
 
 

@@ -37,6 +37,10 @@ class Known:
         """The first surfacing later than `after` (s)."""
         return self._store.first_surfacing(self.glider, after)
 
+    def has_dived(self, since: float) -> bool:
+        """Whether a dive began at `since` (s) or later, also one that has not ended or cannot be used."""
+        return self._store.has_dived(self.glider, since)
+
     def signs(self, since: float) -> tuple[Sign, ...]:
         """Its files that were opened at `since` (s) or later."""
         return self._store.signs(self.glider, since)

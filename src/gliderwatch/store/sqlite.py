@@ -301,6 +301,17 @@ class Store:
         found: float | None = self._db.execute(sql, (glider, after)).fetchone()[0]
         return found
 
+    def has_dived(self, glider: str, since: float) -> bool:
+        """Whether a dive of a glider began at `since` (s) or later, also one that cannot be used.
+
+        A time without files that has not ended with a fix is none; it has headings at its two ends at most.
+        """
+        sql = (
+            "SELECT EXISTS (SELECT 1 FROM assessments WHERE glider = ? AND t_dive >= ? "
+            "AND (ended = 1 OR json_extract(data, '$.n_samples') > 2))"
+        )
+        return bool(self._db.execute(sql, (glider, since)).fetchone()[0])
+
     def signs(self, glider: str, since: float) -> tuple[Sign, ...]:
         """The files of a glider that were opened at `since` (s) or later."""
         sql = "SELECT opened_at, last_t, at FROM heard WHERE glider = ? AND opened_at >= ?"
