@@ -73,6 +73,14 @@ def test_pitch_only():
     assert flight.evidence == "pitch"
 
 
+@pytest.mark.parametrize("stuck", [0.0, -1.5])
+def test_a_depth_that_never_changes_denies_no_glide(stuck):
+    """A sensor that is broken, or a number in its place."""
+    pitch = every(60, 0, 540, 0.05) + every(60, *DIVE, glide) + every(60, DIVE[1] + 60, LAST, 0.05)
+    flight = find_flight(samples(depth=every(60, 0, LAST, stuck), pitch=pitch), 0, LAST)
+    assert (flight.start, flight.end, flight.evidence) == (*DIVE, "pitch")
+
+
 def test_state_of_dead_reckoning():
     state = every(60, 0, 540, 4) + every(60, *DIVE, 1) + every(60, DIVE[1] + 60, LAST, 2)
     flight = find_flight(samples(dr_state=state, heading=every(60, 0, LAST)), 0, LAST)

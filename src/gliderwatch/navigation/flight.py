@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gliderwatch.model import Array, Series
+from gliderwatch.model import EMPTY, Array, Series
 from gliderwatch.navigation.samples import Samples, get
 
 DIVING_DEPTH = 3.0
@@ -49,6 +49,8 @@ def find_flight(samples: Samples, after: float, before: float) -> Flight | None:
     depth, pitch, heading = (
         get(samples, name).between(after, before) for name in ("depth", "pitch", "heading_e")
     )
+    if _is_stuck(depth, pitch):
+        depth = EMPTY
     told = {"depth": depth.t[depth.v > DIVING_DEPTH]}
     if len(pitch):
         steep = pitch.t[np.abs(pitch.v) > DIVING_PITCH]
@@ -89,6 +91,13 @@ def unseen(samples: Samples, after: float, before: float) -> Flight | None:
     if any(len(get(samples, name).between(after, before)) for name in told):
         return None
     return Flight(after, before, "nothing")
+
+
+def _is_stuck(depth: Series, pitch: Series) -> bool:
+    """Whether depth is always the same number while the glider glides down and up: it is not measured."""
+    glides = _mostly_steep(pitch)
+    both = len(glides) > 0 and pitch.v.min() < -DIVING_PITCH and pitch.v.max() > DIVING_PITCH
+    return bool(len(depth) > 1 and both and np.ptp(depth.v) == 0.0)
 
 
 def _mostly_steep(pitch: Series) -> Array:
