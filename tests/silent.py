@@ -33,6 +33,7 @@ class Sea:
     files: list[Sign] = field(default_factory=list)
     open: tuple[Incident, ...] = ()
     glider: str = "electa"
+    dived: bool = True
 
     def call(self, t: float, at: float | None = None, *, read: bool = True) -> Sea:
         """A surfacing at `t`, whose files come at once or at a time, readable or not."""
@@ -57,6 +58,9 @@ class Sea:
 
     def first_surfacing(self, after: float) -> float | None:
         return min((t for t in self.surfacings if t > after), default=None)
+
+    def has_dived(self, since: float) -> bool:
+        return self.dived
 
     def signs(self, since: float) -> tuple[Sign, ...]:
         return tuple(s for s in self.files if s.opened_at >= since)

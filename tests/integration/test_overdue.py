@@ -21,6 +21,7 @@ from gliderwatch.simulate.dockserver import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
 from gliderwatch.store.sqlite import File, Status, Store
+from missions import segment as made
 
 HOUR, DAY = 3600.0, 86400.0
 START = Scenario().start
@@ -167,6 +168,21 @@ def silent(fleet, path: Path | str = ":memory:", **attention) -> tuple[Live, lis
     live.tick(live.now + 60.0)
     due = intake.next_tick(live.store, "angus", live.speaking, live.now)
     return live, segments[n:], due if due is not None else float("inf")
+
+
+@pytest.mark.parametrize("jitter", [0.0, 1e-5])
+def test_tests_on_deck_are_not_missed(jitter: float) -> None:
+    """Eight files of half an hour with hours between them; positions are old ones, or differ by a metre."""
+    live, said = Live(), []
+    for k in range(8):
+        opened = START + 7 * HOUR * k
+        t = [opened + 60.0 * i for i in range(30)]
+        lat = [(x, 27.5 + jitter * ((7 * i + k) % 5)) for i, x in enumerate(t)]
+        held = {"fix_lat": lat, "fix_lon": [(x, -84.0) for x in t], "depth": [(x, -0.2) for x in t]}
+        held |= {"pitch": [(x, 0.02) for x in t], "heading": [(x, 1.0) for x in t]}
+        said += live.take(made(f"angus-2024-119-{k}-0", opened, held, glider="angus"))
+        said += live.until(live.now + 6 * HOUR)
+    assert said + live.until(live.now + 5 * DAY) == []
 
 
 def test_it_ticks_when_it_is_due(fleet) -> None:

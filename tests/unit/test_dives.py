@@ -7,8 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gliderwatch.model import Dive, Segment
+from gliderwatch.model import Dive, Segment, Series
 from gliderwatch.navigation.dives import LONGEST, Navigation, extend
+from gliderwatch.navigation.samples import concatenated
 from gliderwatch.navigation.track import closure
 from missions import LAT, LON, START, Leg, cut, mission, opened, segment, series
 
@@ -148,11 +149,24 @@ class TestUnusable:
         _, dives = told(mission(legs))
         assert dives == []
 
+    def test_a_hole_hides_no_dive_of_a_glider_that_is_where_it_was(self):
+        """At the dock, with tests hours apart."""
+        first, last = mission([Leg(hours=0.05), Leg(hours=0.05)])
+        later = {name: Series(s.t + 18000.0, s.v) for name, s in last.quantities.items()}
+        identity = replace(last.id, opened_at=last.id.opened_at + 18000.0)
+        last = replace(last, id=identity, last_t=last.last_t + 18000.0, quantities=later)
+        here, there = START + 400.0, identity.opened_at + 30.0
+        for north, n in ((0.02, 0), (2.0, 1)):
+            moved = fixes(last, (there, north), (there + 30.0, north + 0.002))
+            _, dives = told([fixes(first, (START + 30.0, 0.0), (here, 0.003)), moved])
+            assert [d.reason[:12] for d in dives] == ["data missing"] * n
+
     def test_mostly_at_the_surface(self):
         s = mission(LEGS)[0]
         end = START + 180 + 7200
         late = fixes(s, (START + 30, 0.0), (START + 90, 0.0), (end + 9000, 3.0), (end + 9030, 3.0))
-        _, (dive,) = told([replace(late, last_t=end + 9100)])
+        depth = concatenated(late.quantities, {"depth": series([(end + 60, 0.4)])})
+        _, (dive,) = told([replace(late, quantities=depth, last_t=end + 9100)])
         assert dive.reason == "mostly surface drift"
 
 

@@ -1,9 +1,11 @@
 """What is flight and what is drift at the surface."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from gliderwatch.navigation.flight import find_flight
+from gliderwatch.navigation.flight import Flight, find_flight, lengthened
 from missions import series
 
 H = 3600.0
@@ -71,6 +73,14 @@ def test_pitch_only():
     assert flight.evidence == "pitch"
 
 
+@pytest.mark.parametrize("stuck", [0.0, -1.5])
+def test_a_depth_that_never_changes_denies_no_glide(stuck):
+    """A sensor that is broken, or a number in its place."""
+    pitch = every(60, 0, 540, 0.05) + every(60, *DIVE, glide) + every(60, DIVE[1] + 60, LAST, 0.05)
+    flight = find_flight(samples(depth=every(60, 0, LAST, stuck), pitch=pitch), 0, LAST)
+    assert (flight.start, flight.end, flight.evidence) == (*DIVE, "pitch")
+
+
 def test_state_of_dead_reckoning():
     state = every(60, 0, 540, 4) + every(60, *DIVE, 1) + every(60, DIVE[1] + 60, LAST, 2)
     flight = find_flight(samples(dr_state=state, heading=every(60, 0, LAST)), 0, LAST)
@@ -127,3 +137,30 @@ class TestDrift:
     def test_with_dead_reckoning(self, hours):
         drift = samples(dr_time=every(60, 0, hours * H, 9000.0), heading=every(60, 0, hours * H))
         assert find_flight(drift, 0, hours * H) is None
+
+
+class TestLengthened:
+    """A flight of which the files hold the beginning, before a fix at `LAST`."""
+
+    SEEN = Flight(600.0, 3000.0, "depth")
+    SURFACE = every(30, 0, 540) + every(30, DIVE[1] + 30, LAST)
+
+    def test_it_ends_where_the_glider_is_at_the_surface_again(self):
+        flight = lengthened(self.SEEN, samples(depth=self.SURFACE), LAST, ())
+        assert flight == replace(self.SEEN, end=DIVE[1] + 30)
+
+    def test_a_position_tells_it_too_and_a_flat_pitch_of_a_turn_does_not(self):
+        told = samples(fix_lat=[(7000, 1.0)], depth=[(700, 9.0)], pitch=[(3010, 0.0)])
+        assert lengthened(self.SEEN, told, LAST, ()).end == 7000
+
+    def test_pitch_tells_where_there_is_no_depth(self):
+        assert lengthened(self.SEEN, samples(pitch=[(3010, 0.0)]), LAST, ()) == self.SEEN
+
+    def test_it_ends_with_the_fix_at_last(self):
+        assert lengthened(self.SEEN, samples(), LAST, ()).end == LAST
+
+    def test_samples_near_by_leave_it_as_it_is(self):
+        assert lengthened(self.SEEN, samples(depth=every(300, 0, LAST)), LAST, ()) == self.SEEN
+
+    def test_a_missing_file_may_hold_a_drift(self):
+        assert lengthened(self.SEEN, samples(depth=self.SURFACE), LAST, [(4000.0, 5000.0)]) == self.SEEN

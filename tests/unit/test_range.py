@@ -45,6 +45,14 @@ def test_short_dives_after_launch_do_not_count():
     assert speed_range(learnt([0.21, 0.2, 0.22], normal=normal), 0.0, PARAMS).usual == 0.21
 
 
+def test_short_dives_count_when_the_trials_after_launch_are_over():
+    """A coastal glider may surface every half hour for weeks."""
+    normal = Normal()
+    for before in range(12):
+        normal = learn(normal, 0.2 + 0.01 * before, 0.0, 0.5, PARAMS, before)
+    assert normal.speeds == pytest.approx([0.28, 0.29, 0.30, 0.31])
+
+
 def test_only_the_first_dives_teach():
     """Slow fouling must not become normal."""
     normal = learnt([0.25] * PARAMS.most + [0.15] * 200)

@@ -76,6 +76,15 @@ def test_commanded_heading_stands_in_for_the_measured_one():
     assert get(prepare(segment("a", 0.0, only), 0.0), "heading_n").v == pytest.approx([-1.0])
 
 
+def test_the_power_of_a_thruster_stands_in_for_its_setting():
+    """Watts and per cent as electa-2022 reports them."""
+    power = {"thruster_power": [(1.0, 0.0), (40.0, 2.9), (70.0, 8.6), (100.0, 30.0)]}
+    out = prepare(segment("a", 0.0, power), 0.0)
+    assert get(out, "thruster_on").v == pytest.approx([0.0, 0.35, 0.60, 1.0], abs=0.01)
+    both = power | {"thruster_on": [(1.0, 0.5)]}
+    assert get(prepare(segment("a", 0.0, both), 0.0), "thruster_on").v.tolist() == [0.5]
+
+
 def test_positions_without_their_partner_are_left_out():
     held = {"fix_lat": [(1.0, 36.0), (2.0, 36.1)], "fix_lon": [(2.0, -70.0), (3.0, -70.1)]}
     out = prepare(segment("a", 0.0, held), 0.0)

@@ -113,6 +113,13 @@ class TestGuess:
         assert clock.at(T0 + 10 * INTERVAL + 1.5 * INTERVAL + 2400) == ["overdue"]
         assert "no position is known" in clock.alerts[0].body
 
+    def test_not_before_it_was_launched(self):
+        """Files of the deck and of the dock, all read, and not a dive in them."""
+        sea = Sea(files=list(self.FILES), dived=False)
+        assert Clock(sea).at(T0 + 20 * INTERVAL) == []
+        sea.call(T0 + 9 * INTERVAL, read=False)
+        assert Clock(sea).at(T0 + 20 * INTERVAL) == ["overdue"]
+
 
 class TestFirstCall:
     CALL = Awaited(T0 + CALL, T0 + INTERVAL, DUE, INTERVAL)

@@ -28,7 +28,8 @@ class RangeParams:
     ``least`` and ``most`` are how many dives at a setting are needed and used. The half width of the range
     is ``width`` robust standard deviations; downwards at least ``narrowest`` and at most ``widest`` of the
     median, so that a loss of 30 % is always outside, upwards at least ``above`` of it. ``shortest`` (h)
-    is how long a dive must be to count: on the short ones after launch pilots try out the ballast.
+    is how long a dive must be to count among the first ``trials`` of a deployment: on the short ones after
+    launch pilots try out the ballast.
     """
 
     least: int = 3
@@ -38,6 +39,7 @@ class RangeParams:
     widest: float = 0.25
     above: float = 0.35
     shortest: float = 1.0
+    trials: int = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +66,12 @@ def setting(evidence: Mapping[str, float]) -> float:
     return evidence.get("thruster", 0.0)
 
 
-def learn(normal: Normal, speed: float, at: float, hours: float, params: RangeParams) -> Normal:
-    """The healthy dives with one more, of some ``hours`` at a setting."""
-    if hours < params.shortest or int(_alike(normal, at).sum()) >= params.most:
+def learn(
+    normal: Normal, speed: float, at: float, hours: float, params: RangeParams, before: int = 0
+) -> Normal:
+    """The healthy dives with one more, of some ``hours`` at a setting, after all that came ``before``."""
+    is_trial = hours < params.shortest and before < params.trials
+    if is_trial or int(_alike(normal, at).sum()) >= params.most:
         return normal
     return Normal(readonly([*normal.speeds, speed]), readonly([*normal.settings, at]))
 

@@ -28,6 +28,7 @@ DEPARTURE, SLACK = 0.08, 1.0
 and how many times that does not add to the sum."""
 OWN_SURE = 0.15
 """Standard error of W on a dive, as part of it, up to which the dive tells what W is to what is reported."""
+NOT_FLOWN = "the way does not fit the commanded heading, and the measured one is not in the file"
 ROLLED, ROLLS = 0.12, 5
 """rad: a step of the mean roll that speaks for a lost or bent wing; dives that tell the usual roll, and
 samples that tell the roll of a dive."""
@@ -108,6 +109,8 @@ def step(
         return state, Verdict(flag, reason, normal, None)
     state = replace(state, joint=estimate, rolled=rolled, misfits=_misfits(state, info))
     flag, reason = _wrong(state, info, params)
+    if flag is not None and info.cause is not Cause.CURRENT and dive.evidence.get("heading_commanded", 0.0):
+        flag, reason = None, NOT_FLOWN  # nothing is wrong that is measured
     if flag is None and not reason:
         state, flag, reason = _slow_or_fast(state, info, told, normal, params)
     if flag is Flag.NORMAL and not frozen:
@@ -228,5 +231,6 @@ def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: S
         state = replace(state, ratios=learn_ratios(state.ratios, dive.evidence, own[0]))
     if params.learning is None or info.told is not None:
         return state
-    hours = dive.evidence.get("duration_h", 0.0)
-    return replace(state, normal=learn(state.normal, info.estimate.speed, at, hours, params.learning))
+    hours, before = dive.evidence.get("duration_h", 0.0), state.joint.dives - 1 if state.joint else 0
+    normal = learn(state.normal, info.estimate.speed, at, hours, params.learning, before)
+    return replace(state, normal=normal)

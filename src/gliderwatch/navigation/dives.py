@@ -13,8 +13,8 @@ from types import MappingProxyType
 
 from gliderwatch.model import Dive, Fix, Segment
 from gliderwatch.navigation.current import Known, Report, new_reports, pair, updated
-from gliderwatch.navigation.fixes import FASTEST, distance, new_fixes
-from gliderwatch.navigation.flight import SPARSE, Flight, find_flight
+from gliderwatch.navigation.fixes import FASTEST, SUSPECT, distance, new_fixes
+from gliderwatch.navigation.flight import SPARSE, Flight, find_flight, lengthened, unseen
 from gliderwatch.navigation.quality import flight_notes, heading_gap, segment_notes, why_unusable
 from gliderwatch.navigation.samples import Samples, after, concatenated, get, prepare
 from gliderwatch.navigation.track import attitude, build_track, evidence
@@ -147,15 +147,19 @@ def _flight_since(state: Navigation, samples: Samples, end: Fix | None) -> Fligh
     if not DIP < last - first <= LONGEST:
         return None
     flight = find_flight(samples, first, last)
-    if flight is None and state.fix is not None:
+    if flight is None and state.fix is not None and (end is None or distance(state.fix, end) > SUSPECT):
         hidden = [(a, min(b, last)) for a, b in state.holes if min(b, last) - a >= HIDING]
         flight = Flight(*hidden[-1], evidence="missing") if hidden else None
+        if flight is None and end is not None and last - first >= HIDING:
+            flight = unseen(samples, first, last)
     return flight
 
 
 def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end: Fix | None) -> Dive:
     """The dive between the last fix and `end` (None: not surfaced yet as far as known)."""
-    start = state.fix
+    start, seen = state.fix, flight
+    if end is not None:
+        flight = lengthened(flight, samples, end.t, state.holes)
     missing = sum(min(b, end.t) - a for a, b in state.holes if a < end.t) if end is not None else 0.0
     reason = why_unusable(samples, flight, start, end, missing)
     track = None
@@ -170,7 +174,7 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
         glider=glider,
         segment=state.holder,
         t_dive=flight.start,
-        t_surface=flight.end,
+        t_surface=seen.end,
         start=start,
         end=end,
         track=track,

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gliderwatch.model import Array, Series
+from gliderwatch.model import EMPTY, Array, Series
 from gliderwatch.navigation.samples import Samples, get
 
 DIVING_DEPTH = 3.0
@@ -48,6 +49,8 @@ def find_flight(samples: Samples, after: float, before: float) -> Flight | None:
     depth, pitch, heading = (
         get(samples, name).between(after, before) for name in ("depth", "pitch", "heading_e")
     )
+    if _is_stuck(depth, pitch):
+        depth = EMPTY
     told = {"depth": depth.t[depth.v > DIVING_DEPTH]}
     if len(pitch):
         steep = pitch.t[np.abs(pitch.v) > DIVING_PITCH]
@@ -63,6 +66,38 @@ def find_flight(samples: Samples, after: float, before: float) -> Flight | None:
         return None
     evidence = " and ".join(name for name, t in told.items() if len(t))
     return Flight(float(times.min()), float(times.max()), evidence)
+
+
+def lengthened(
+    flight: Flight, samples: Samples, before: float, holes: Iterable[tuple[float, float]]
+) -> Flight:
+    """The flight until the glider is at the surface again, if the files hold only its beginning.
+
+    Some tell of every third yo only. Where for longer than `DENIES` after what was seen there is no depth
+    (pitch, where depth is not sent) and no position, the flight goes on to the first of them: at the surface
+    a glider tells its position at once. Where a whole file is missing (``holes``, s) that cannot be said.
+    """
+    told = "depth" if len(get(samples, "depth").between(flight.start, before)) else "pitch"
+    times = np.concatenate([get(samples, told).t, get(samples, "fix_lat").t])
+    end = float(np.min(times[times > flight.end], initial=before))
+    if end - flight.end <= DENIES or any(a < end and b > flight.end for a, b in holes):
+        return flight
+    return replace(flight, end=end)
+
+
+def unseen(samples: Samples, after: float, before: float) -> Flight | None:
+    """All of the time between two positions where the files tell nothing of it: there may be a whole dive."""
+    told = ("depth", "pitch", "heading_e", "dr_state", "dr_time")
+    if any(len(get(samples, name).between(after, before)) for name in told):
+        return None
+    return Flight(after, before, "nothing")
+
+
+def _is_stuck(depth: Series, pitch: Series) -> bool:
+    """Whether depth is always the same number while the glider glides down and up: it is not measured."""
+    glides = _mostly_steep(pitch)
+    both = len(glides) > 0 and pitch.v.min() < -DIVING_PITCH and pitch.v.max() > DIVING_PITCH
+    return bool(len(depth) > 1 and both and np.ptp(depth.v) == 0.0)
 
 
 def _mostly_steep(pitch: Series) -> Array:

@@ -18,6 +18,9 @@ SPACING = 30.0
 """Seconds: finer samples are averaged to this. A glider turns and pitches in minutes, and a
 checkpoint that carries a dive on to the next segment stays small also for 4 s data."""
 
+FULL_POWER = 24.0
+"""W of a thruster that is fully on: power goes with the square of the setting (electa-2022: 2.9 W at 35 %,
+8.6 W at 60 %)."""
 _VOLUMES = ("ballast", "oil_volume")
 _KEPT = ("pitch", "roll", "depth", "speed_onboard", "dr_state", "dr_time", "thruster_on", "vacuum", *_VOLUMES)
 _PAIRS = (("fix_lat", "fix_lon"), ("dr_lat", "dr_lon"))
@@ -72,19 +75,25 @@ def prepare(segment: Segment, declination: float) -> Samples:
 
     Keys: ``fix_lat, fix_lon, dr_lat, dr_lon`` (degrees), ``heading_e, heading_n`` (unit vectors;
     the commanded heading where the measured one is absent), ``pitch, roll`` (rad), ``depth`` (m),
-    ``speed_onboard`` (m/s), ``dr_state``, ``dr_time`` (s), ``thruster_on`` (0 to 1), ``vacuum`` (Pa),
-    ``ballast``, ``oil_volume`` (m3).
+    ``speed_onboard`` (m/s), ``dr_state``, ``dr_time`` (s), ``thruster_on`` (0 to 1; by its power where the
+    setting is absent), ``vacuum`` (Pa),
+    ``ballast``, ``oil_volume`` (m3); ``commanded``, 1 at each heading that is a commanded one.
     """
     source = "heading" if len(segment.get("heading")) else "heading_commanded"
-    wanted = (*_KEPT, source, *(name for pair in _PAIRS for name in pair))
+    wanted = (*_KEPT, "thruster_power", source, *(name for pair in _PAIRS for name in pair))
     given = compact({name: segment.quantities[name] for name in wanted if name in segment.quantities})
     out = {name: given[name] for name in _KEPT if name in given}
+    if "thruster_on" not in given and "thruster_power" in given:
+        power = given["thruster_power"]
+        out["thruster_on"] = Series(power.t, readonly(np.sqrt(np.minimum(power.v / FULL_POWER, 1.0))))
     for pair in _PAIRS:
         t, lat, lon = joined(given.get(pair[0], EMPTY), given.get(pair[1], EMPTY))
         _add(out, pair, t, np.stack([lat, lon], axis=-1))
     heading = given.get(source, EMPTY)
     vectors = magnetic_to_true(heading_vectors(heading.v), declination)
     _add(out, ("heading_e", "heading_n"), heading.t, vectors)
+    if source == "heading_commanded" and len(heading):
+        out["commanded"] = Series(heading.t, readonly(np.ones(len(heading))))
     return MappingProxyType(out)
 
 

@@ -95,6 +95,10 @@ def evidence(samples: Samples, flight: Flight, track: Track) -> dict[str, float]
         "heading_steadiness": float(np.hypot(*mean)) * interval / max(flown, 1.0),
         "heading_mean": degrees(atan2(mean[0], mean[1])) % 360,
     }
+    commanded = get(samples, "commanded").between(flight.start, flight.end)
+    if len(commanded):
+        headings = get(samples, "heading_e").between(flight.start, flight.end)
+        out["heading_commanded"] = len(commanded) / len(headings)
     return out | attitude(samples, flight)
 
 

@@ -22,6 +22,7 @@ from gliderwatch.rules.silence import (
     first_call,
     guess,
     is_at_sea,
+    is_launched,
     severity,
 )
 
@@ -61,6 +62,9 @@ class Known(Protocol):
 
     def first_surfacing(self, after: float) -> float | None:
         """The first surfacing later than `after` (s)."""
+
+    def has_dived(self, since: float) -> bool:
+        """Whether a dive began at `since` (s) or later, also one that has not ended or cannot be used."""
 
     def signs(self, since: float) -> tuple[Sign, ...]:
         """Its files that were opened at `since` (s) or later."""
@@ -141,7 +145,7 @@ def _going_on(
         return told
     signs = known.signs(now - RECENT)
     expected = known.expected(now) or guess(signs, now)
-    if expected is None:
+    if expected is None or not is_launched(signs, known.has_dived(now - RECENT)):
         return None
     call = awaited(expected, signs, now, overdue_hours)
     if not is_at_sea(signs, call.interval, now):

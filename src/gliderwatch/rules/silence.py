@@ -121,6 +121,14 @@ def is_at_sea(signs: Iterable[Sign], interval: float, now: float) -> bool:
     return any(t <= now and now - t < GONE and at - t < FRESH for t, at in times)
 
 
+def is_launched(signs: Iterable[Sign], has_dived: bool) -> bool:
+    """Whether a glider is in the water: it has dived lately, or there are files of which that is not known.
+
+    On deck and at the dock it makes files too, and then no more for days.
+    """
+    return has_dived or any(s.last_t is None for s in signs)
+
+
 def first_call(after: Awaited, signs: Iterable[Sign], surfacing: float | None, now: float) -> float | None:
     """The first sign of life of a later call than the one last heard; `surfacing` is the first fix since.
 

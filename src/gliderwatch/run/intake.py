@@ -116,7 +116,7 @@ def _outlooks(
     for known in map(store.known, gliders):
         signs = known.signs(now - RECENT)
         expected = known.expected(now) or silence.guess(signs, now)
-        if expected is not None:
+        if expected is not None and silence.is_launched(signs, known.has_dived(now - RECENT)):
             yield expected, signs
 
 

@@ -12,7 +12,7 @@ from gliderwatch.model import Assessment, Expected, Incident
 from gliderwatch.params import Attention
 from gliderwatch.rules.acknowledged import Acks
 from gliderwatch.rules.overdue import RECENT
-from gliderwatch.rules.silence import GONE, Awaited, awaited, guess
+from gliderwatch.rules.silence import GONE, Awaited, awaited, guess, is_launched
 from gliderwatch.run.life import STALE, is_held, silence
 from gliderwatch.run.lines import assessment_line, iso
 from gliderwatch.run.manage.incidents import ack_json
@@ -120,7 +120,9 @@ def _glider(store: Store, name: str, config: Config, now: float) -> GliderStatus
     incidents = tuple(i for i in store.incidents(name) if i.cleared_at is None)
     attention = store.notes.heeded(name, config.attention(name))
     signs, acks = known.signs(now - RECENT), store.notes.acks(name)
-    expected = known.expected(now) or guess(signs, now)
+    expected = known.expected(now)
+    if expected is None and is_launched(signs, known.has_dived(now - RECENT)):
+        expected = guess(signs, now)
     call = awaited(expected, signs, now, attention.overdue_hours) if expected is not None else None
     configured = name in config.gliders
     return GliderStatus(

@@ -47,6 +47,17 @@ class Known:
         found: float | None = self._db.execute(sql, (self.glider, after)).fetchone()[0]
         return found
 
+    def has_dived(self, since: float) -> bool:
+        """Whether a dive began at `since` (s) or later, also one that has not ended or cannot be used.
+
+        A time without files that has not ended with a fix is none; it has headings at its two ends at most.
+        """
+        sql = (
+            "SELECT EXISTS (SELECT 1 FROM assessments WHERE glider = ? AND t_dive >= ? "
+            "AND (ended = 1 OR json_extract(data, '$.n_samples') > 2))"
+        )
+        return bool(self._db.execute(sql, (self.glider, since)).fetchone()[0])
+
     def signs(self, since: float) -> tuple[Sign, ...]:
         """Its files that were opened at `since` (s) or later."""
         sql = "SELECT opened_at, last_t, at FROM heard WHERE glider = ? AND opened_at >= ?"
