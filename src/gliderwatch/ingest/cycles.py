@@ -60,6 +60,7 @@ def intact(data: bytes, start: int, sensors: Sensors) -> tuple[int, int, int]:
     n_state = (len(sensors.sizes) + 3) // 4
     lowest, masks = _masks(sensors.sizes, n_state)
     n, end, after = -1, start, start + _KNOWN_BYTES
+    lengths: dict[bytes, int] = {}  # most cycles of a file hold the same sensors as one before
     while after <= len(data):
         tag = data[after : after + 1]
         if tag not in (_CYCLE, _END, b""):
@@ -69,12 +70,19 @@ def intact(data: bytes, start: int, sensors: Sensors) -> tuple[int, int, int]:
         after = first + n_state
         if tag != _CYCLE or after > len(data):
             break
-        state = int.from_bytes(data[first:after], "big")
-        high = (state >> 1) & lowest
-        follows = high ^ (high & state)
-        for size, mask in masks:
-            after += size * (follows & mask).bit_count()
+        state = data[first:after]
+        if state not in lengths:
+            lengths[state] = _length(state, lowest, masks)
+        after += lengths[state]
     return max(n, 0), end, 0
+
+
+def _length(state: bytes, lowest: int, masks: list[tuple[int, int]]) -> int:
+    """Bytes of the values that follow the state bytes of a cycle; see `_masks`."""
+    number = int.from_bytes(state, "big")
+    high = (number >> 1) & lowest
+    follows = high ^ (high & number)
+    return sum(size * (follows & mask).bit_count() for size, mask in masks)
 
 
 def _masks(sizes: tuple[int, ...], n_state: int) -> tuple[int, list[tuple[int, int]]]:

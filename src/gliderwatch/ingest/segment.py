@@ -185,14 +185,16 @@ def _clean(
         good = _within(t, *window) & ~absent
         for row, v in zip(rows, values, strict=True):
             good &= _within(v, row.low, row.high)
-    increasing, first = np.unique(t[good], return_index=True)
-    times = readonly(increasing)
+    at = np.flatnonzero(good)
+    if not (t[at[1:]] > t[at[:-1]]).all():
+        at = at[np.unique(t[at], return_index=True)[1]]
+    times = readonly(t[at])
     lost = {
         row.name: len(each[0]) - int(absent.sum()) - len(times) for row, each in zip(rows, raw, strict=True)
     }
     if not len(times):
         return {}, lost
-    kept = {row.name: Series(times, readonly(v[good][first])) for row, v in zip(rows, values, strict=True)}
+    kept = {row.name: Series(times, readonly(v[at])) for row, v in zip(rows, values, strict=True)}
     return kept, lost
 
 
