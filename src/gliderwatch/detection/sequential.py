@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 
@@ -142,6 +143,7 @@ def cusum(before: float, departure: float, slack: float) -> float:
     return max(0.0, before + departure - slack)
 
 
+@cache
 def cusum_bound(slack: float, dives_between_alarms: float) -> float:
     """The sum that a healthy glider reaches once in so many dives, departures being white and normal.
 

@@ -82,7 +82,7 @@ def _agree(a: Fix | None, b: Fix | None) -> bool:
 
 
 def stays(fixes: list[Fix], apart: float) -> list[tuple[Fix, Fix]]:
-    """The first and the last fix of each stay at the surface: within it they are at most ``apart`` (s).
+    """The first and the last fix of each stay, in which none is more than ``apart`` (s) after the one before.
 
     >>> [(a.t, b.t) for a, b in stays([Fix(t, 0.0, 0.0) for t in (0.0, 60.0, 120.0, 9000.0)], 120.0)]
     [(0.0, 120.0), (9000.0, 9000.0)]
