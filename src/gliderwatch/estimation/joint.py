@@ -293,8 +293,9 @@ def _opened(state: JointState, told: Step | None) -> JointState:
     """
     if told is None:
         return state
-    cov = state.cov + told.cov + np.outer(told.shift, told.shift) / 4
-    return replace(state, x=readonly(state.x + told.shift), cov=readonly(cov), bank=Bank())
+    shift = told.shift
+    cov = state.cov + told.cov + np.outer(shift, shift) / 4
+    return replace(state, x=readonly(state.x + shift), cov=readonly(cov), bank=Bank())
 
 
 def _estimate(state: JointState, seen: Observation, params: JointParams, usual: float | None) -> Estimate:

@@ -60,15 +60,16 @@ def intact(data: bytes, start: int, sensors: Sensors) -> tuple[int, int, int]:
     n_state = (len(sensors.sizes) + 3) // 4
     lowest, masks = _masks(sensors.sizes, n_state)
     n, end, after = -1, start, start + _KNOWN_BYTES
-    lengths: dict[bytes, int] = {}  # most cycles of a file hold the same sensors as one before
-    while after <= len(data):
+    size = len(data)
+    lengths: dict[bytes, int] = {}  # most cycles hold the same sensors as one before
+    while after <= size:
         tag = data[after : after + 1]
         if tag not in (_CYCLE, _END, b""):
-            return max(n, 0), end, len(data) - end
+            return max(n, 0), end, size - end
         n, end = n + 1, after
         first = after + 1
         after = first + n_state
-        if tag != _CYCLE or after > len(data):
+        if tag != _CYCLE or after > size:
             break
         state = data[first:after]
         if state not in lengths:
