@@ -54,7 +54,7 @@ class Series:
 
     def between(self, start: float, end: float) -> Series:
         """The samples with start <= t <= end."""
-        i, j = np.searchsorted(self.t, start, "left"), np.searchsorted(self.t, end, "right")
+        i, j = self.t.searchsorted(start, "left"), self.t.searchsorted(end, "right")
         return Series(self.t[i:j], self.v[i:j])
 
 

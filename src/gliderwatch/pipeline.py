@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from functools import cache
 
 import msgspec
 
@@ -68,6 +69,7 @@ class Outcome:
     expected: Expected | None
 
 
+@cache
 def digest(params: GliderParams) -> str:
     """A short hash of all parameters, to be kept with what they led to."""
     return hashlib.sha256(msgspec.json.encode(params, order="sorted")).hexdigest()[:12]

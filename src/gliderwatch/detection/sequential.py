@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 
@@ -59,16 +60,33 @@ class Step:
     """The likeliest step.
 
     ``ratio`` is twice the log likelihood ratio: where there was no step, of chi-square with one degree of
-    freedom at each dive. ``size`` and ``sigma`` of the step; ``dives`` since it (1: before the
-    last one); ``shift`` ((n,)) of the state by all of it and ``cov`` ((n, n)) of that.
+    freedom at each dive. ``which`` number and ``sigma`` of the step; ``dives`` since it (1: before the
+    last one); ``shifts``, ``info`` and ``score``: the hypothesis, as in the `Bank`.
     """
 
     ratio: float
-    size: float
+    which: int
     sigma: float
     dives: int
-    shift: Array
-    cov: Array
+    shifts: Array
+    info: Array
+    score: Array
+
+    @property
+    def size(self) -> float:
+        """Size of the step."""
+        return float((np.linalg.inv(self.info) @ self.score)[self.which])
+
+    @property
+    def shift(self) -> Array:
+        """By how much the state is off by all of it, (n,)."""
+        return np.asarray(self.shifts @ (np.linalg.inv(self.info) @ self.score))
+
+    @property
+    def cov(self) -> Array:
+        """Covariance of `shift`, (n, n)."""
+        shifted = self.shifts @ np.linalg.inv(self.info) @ self.shifts.T
+        return np.asarray((shifted + shifted.T) / 2)
 
 
 def advance(bank: Bank, shape: Array, precision: Array, kept: Array, update: Update) -> Bank:
@@ -105,16 +123,14 @@ def likeliest(bank: Bank, which: int, sign: int = 0) -> Step | None:
     score = bank.score[:, which] - (used @ bank.score[:, rest, None])[:, 0, 0]
     ratio = np.where(score * sign >= 0, score**2 / info, 0.0)
     k = int(ratio.argmax())
-    cov = np.linalg.inv(bank.info[k])
-    step = cov @ bank.score[k]
-    shifted = bank.shift[k] @ cov @ bank.shift[k].T
     return Step(
         ratio=float(ratio[k]),
-        size=float(step[which]),
+        which=which,
         sigma=float(info[k]) ** -0.5,
         dives=len(ratio) - k,
-        shift=readonly(bank.shift[k] @ step),
-        cov=readonly((shifted + shifted.T) / 2),
+        shifts=bank.shift[k],
+        info=bank.info[k],
+        score=bank.score[k],
     )
 
 
@@ -142,6 +158,7 @@ def cusum(before: float, departure: float, slack: float) -> float:
     return max(0.0, before + departure - slack)
 
 
+@cache
 def cusum_bound(slack: float, dives_between_alarms: float) -> float:
     """The sum that a healthy glider reaches once in so many dives, departures being white and normal.
 

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import compress
+from math import isfinite
 from statistics import median
 
 import numpy as np
@@ -99,7 +101,8 @@ def learn(baseline: Baseline, evidence: Mapping[str, float]) -> Baseline:
     if len(alike) > FIRST + RECENT:
         dives = np.delete(dives, alike[FIRST], axis=0)
     dives = dives[-MOST:]
-    return Baseline(readonly(np.nan_to_num(dives)), readonly(np.isfinite(dives)))
+    known = np.isfinite(dives)
+    return Baseline(readonly(np.where(known, dives, 0.0)), readonly(known))
 
 
 def compare(baseline: Baseline, evidence: Mapping[str, float]) -> dict[str, Usual]:
@@ -109,11 +112,11 @@ def compare(baseline: Baseline, evidence: Mapping[str, float]) -> dict[str, Usua
     row = _row(evidence)
     dives = _dives(baseline)
     dives = dives[_same_setting(dives, row)]
+    same = {given: _same_trim(dives, row, given) for given in {q.given for q in QUANTITIES}}
     out = {}
-    for quantity in QUANTITIES:
-        value = float(row[_COLUMN[quantity.name]])
-        usual = _usual(dives, row, quantity)
-        if np.isfinite(value) and usual is not None:
+    for quantity, value, values in zip(QUANTITIES, row.tolist(), dives.T.tolist(), strict=False):
+        usual = _usual(values, same[quantity.given], quantity) if isfinite(value) else None
+        if usual is not None:
             out[quantity.name] = Usual(value, *usual)
     return out
 
@@ -171,34 +174,36 @@ def _same_setting(dives: Array, row: Array) -> NDArray[np.bool_]:
     return np.asarray((np.abs(dives[:, at] - row[at]) < LIKE) & ((dives[:, at] > 0) == (row[at] > 0)))
 
 
-def _usual(dives: Array, row: Array, quantity: Quantity) -> tuple[float, float, float] | None:
-    """Low, usual and high value of a number among dives, None where too few tell."""
-    column = _COLUMN[quantity.name]
-    dives = dives[np.isfinite(dives[:, column])]
-    windows = [window[:, column] for window in (dives[:FIRST], dives[-RECENT:])]
+def _usual(values: list[float], same: list[bool], quantity: Quantity) -> tuple[float, float, float] | None:
+    """Low, usual and high value of a number among dives, None where too few tell.
+
+    ``values`` of each dive, NaN where it does not tell; ``same``: whether it was at the same trim.
+    """
+    known = [value for value in values if isfinite(value)]
+    windows = [known[:FIRST], known[-RECENT:]]
     if quantity.given:
-        windows = [dives[:FIRST], dives[FIRST:]]
-        alike = [window[_same_trim(window, row, quantity.given)][:, column] for window in windows]
+        alike = [each for value, each in zip(values, same, strict=True) if isfinite(value)]
+        first = list(compress(known[:FIRST], alike))
         # the first dives alone, so that what grows slowly is not usual in the end
-        windows = [alike[0]] if len(alike[0]) >= LEAST else [np.concatenate(alike)]
+        windows = [first if len(first) >= LEAST else list(compress(known, alike))]
     if len(windows[-1]) < LEAST:
         return None
     ranges = [_range(values, quantity) for values in windows]
     return min(low for low, _, _ in ranges), ranges[-1][1], max(high for _, _, high in ranges)
 
 
-def _same_trim(dives: Array, row: Array, given: tuple[str, ...]) -> NDArray[np.bool_]:
-    """Which dives had the same of what a number depends on, as far as both tell."""
+def _same_trim(dives: Array, row: Array, given: tuple[str, ...]) -> list[bool]:
+    """Whether each dive had the same of what a number depends on, as far as both tell."""
     same = np.ones(len(dives), dtype=bool)
     for name in given:
         quantity, column = _BY_NAME[name], _COLUMN[name]
         apart = np.abs(dives[:, column] - row[column])
         same &= ~(apart > max(quantity.least, quantity.part * abs(row[column])))
-    return same
+    return same.tolist()
 
 
-def _range(values: Array, quantity: Quantity) -> tuple[float, float, float]:
-    usual = median(values.tolist())  # of a dozen values: half of an assessment's time with numpy's
-    spread = WIDTH * MAD_TO_SIGMA * median(np.abs(values - usual).tolist())
+def _range(values: list[float], quantity: Quantity) -> tuple[float, float, float]:
+    usual = median(values)  # of a dozen values: numpy's is for thousands
+    spread = WIDTH * MAD_TO_SIGMA * median([abs(value - usual) for value in values])
     half = max(spread, quantity.least, quantity.part * abs(usual))
     return usual - half, usual, usual + half

@@ -7,9 +7,9 @@ innovations then say which of them is meant.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from enum import StrEnum
+from math import exp, log, pi, sqrt
 
 import numpy as np
 
@@ -54,16 +54,15 @@ class Surprises:
     current: Surprise = Surprise(0.02, 0.4)
     ground: Surprise = Surprise(0.01, 0.3)
 
-    def of(self, cause: Cause) -> Surprise:
-        """The surprise of a cause; for the usual one what is left of the chances."""
+    def by_cause(self) -> dict[Cause, Surprise]:
+        """The surprise of each cause; of the usual one what is left of the chances."""
         told = {
             Cause.SPEED: self.speed,
             Cause.FLOW: self.flow,
             Cause.CURRENT: self.current,
             Cause.GROUND: self.ground,
         }
-        usual = Surprise(1 - sum(each.chance for each in told.values()), 0.0)
-        return told.get(cause, usual)
+        return {Cause.USUAL: Surprise(1 - sum(each.chance for each in told.values()), 0.0), **told}
 
 
 def opened(linear: Linear, cov: Array, cause: Cause, size: float) -> tuple[Linear, Array]:
@@ -74,7 +73,7 @@ def opened(linear: Linear, cov: Array, cause: Cause, size: float) -> tuple[Linea
     elif cause is Cause.FLOW:
         more[LASTING] = size**2
     elif cause is Cause.CURRENT:
-        wrong[2:] = size**2
+        wrong[2:4] = size**2
     elif cause is Cause.GROUND:
         wrong[:2] = size**2
     return Linear(linear.rows, linear.innovation, linear.noise + np.diag(wrong)), cov + np.diag(more)
@@ -89,6 +88,14 @@ class Told:
     x: Array
 
 
+@dataclass(frozen=True, slots=True)
+class Odds:
+    """Probability of a cause, and whether W as the glider tells it fits if that is the cause."""
+
+    chance: float
+    believes: bool
+
+
 def odds(
     expected: Linear,
     actual: Linear,
@@ -96,48 +103,50 @@ def odds(
     own: float | None,
     surprises: Surprises,
     told: Told | None = None,
-) -> dict[Cause, float]:
-    """Probability of each cause.
+) -> dict[Cause, Odds]:
+    """The odds of each cause.
 
     ``expected`` is linear about the own speed that was expected, ``actual`` about the one that ground
     velocity and current give, ``own`` (m/s): that is none where one of the two is wrong. Without a
     current only speed and flow can be in question.
     """
-    logs = {}
-    for cause in Cause:
-        if cause.is_error and len(actual.rows) == 2:
-            continue
-        if cause is Cause.SPEED and own is not None and not 0 < own < FASTEST:
-            continue
-        surprise = surprises.of(cause)
-        linear = expected if cause.is_error else actual
-        likelihood = max(_log_densities(linear, cov, cause, surprise.size, told))
-        logs[cause] = math.log(surprise.chance) + likelihood
-    most = max(logs.values())
-    total = sum(math.exp(each - most) for each in logs.values())
-    return {cause: math.exp(each - most) / total for cause, each in logs.items()}
-
-
-def is_believed(linear: Linear, cov: Array, cause: Cause, size: float, told: Told) -> bool:
-    """Whether W as the glider tells it fits a dive that has that cause."""
-    without, with_it = _log_densities(linear, cov, cause, size, told)
-    return with_it > without
+    possible = surprises.by_cause()
+    if len(actual.rows) == 2:
+        possible = {cause: each for cause, each in possible.items() if not cause.is_error}
+    if own is not None and not 0 < own < FASTEST:
+        del possible[Cause.SPEED]
+    without = right = _log_densities(possible, expected, actual, cov)
+    if told is not None:
+        without = [each + log(told.tells.lies / FASTEST) + log(sqrt(2 * pi)) for each in without]
+        expected, actual = (each.with_own(told.x, told.tells) for each in (expected, actual))
+        with_it = _log_densities(possible, expected, actual, cov)
+        right = [each + log(1 - told.tells.lies) for each in with_it]
+    logs = [
+        log(each.chance) + max(pair)
+        for each, pair in zip(possible.values(), zip(without, right, strict=True), strict=True)
+    ]
+    most = max(logs)
+    total = sum(exp(each - most) for each in logs)
+    return {
+        cause: Odds(exp(each - most) / total, right[i] > without[i])
+        for i, (cause, each) in enumerate(zip(possible, logs, strict=True))
+    }
 
 
 def _log_densities(
-    linear: Linear, cov: Array, cause: Cause, size: float, told: Told | None
-) -> tuple[float, float]:
-    """Log density of the innovation, but for a constant, if that is the cause: what the glider tells of W
-    being wrong, and being right (minus infinity: it tells nothing)."""
-    linear, cov = opened(linear, cov, cause, size)
-    plain = _log_density(linear, cov)
-    if told is None:
-        return plain, -math.inf
-    wrong = plain + math.log(told.tells.lies / FASTEST) + math.log(math.sqrt(2 * math.pi))
-    return wrong, _log_density(linear.with_own(told.x, told.tells), cov) + math.log(1 - told.tells.lies)
-
-
-def _log_density(linear: Linear, cov: Array) -> float:
-    s = linear.rows @ cov @ linear.rows.T + linear.noise
-    square = float(linear.innovation @ np.linalg.solve(s, linear.innovation))
-    return -0.5 * (square + float(np.linalg.slogdet(s)[1]))
+    possible: dict[Cause, Surprise], expected: Linear, actual: Linear, cov: Array
+) -> list[float]:
+    """Log density of the innovation, but for a constant, of each cause."""
+    each = [
+        opened(expected if cause.is_error else actual, cov, cause, surprise.size)
+        for cause, surprise in possible.items()
+    ]
+    rows = np.array([linear.rows for linear, _ in each])
+    noise = np.array([linear.noise for linear, _ in each])
+    innovations = np.array([linear.innovation for linear, _ in each])
+    s = rows @ np.array([cov for _, cov in each]) @ rows.transpose(0, 2, 1) + noise
+    solved = np.linalg.solve(s, innovations[:, :, None])[:, :, 0]
+    squares = [float(e @ x) for e, x in zip(innovations, solved, strict=True)]
+    return [
+        -0.5 * (square + float(size)) for square, size in zip(squares, np.linalg.slogdet(s)[1], strict=True)
+    ]

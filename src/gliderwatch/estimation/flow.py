@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from gliderwatch.model import Array
+from gliderwatch.model import Array, readonly
 
 HOUR, DAY = 3600.0, 86400.0
 LASTING = slice(0, 2)
@@ -88,6 +89,7 @@ def crossing(flow: Array, ground: Array, dt: float, params: FlowParams) -> float
     return float(np.hypot(*flow)) * min(float(np.hypot(*ground)) * dt / params.scale, 1.0)
 
 
+@lru_cache(maxsize=64)
 def mean_flow(start: float, end: float, params: FlowParams) -> Array:
     """The rows (2, size) that give the mean flow (east, north) between two times (s) from the state.
 
@@ -105,4 +107,4 @@ def mean_flow(start: float, end: float, params: FlowParams) -> Array:
         angle = math.pi * (start + end) / tide.period
         at = 4 + 4 * i
         rows[0, at : at + 2] = rows[1, at + 2 : at + 4] = smooth * math.cos(angle), smooth * math.sin(angle)
-    return rows
+    return readonly(rows)

@@ -22,7 +22,7 @@ import numpy as np
 
 from gliderwatch.detection.sequential import Bank, Step, Update
 from gliderwatch.estimation import flow, hidden
-from gliderwatch.estimation.causes import FASTEST, Cause, Surprises, Told, is_believed, odds, opened
+from gliderwatch.estimation.causes import FASTEST, Cause, Surprises, Told, odds, opened
 from gliderwatch.estimation.flow import FlowParams
 from gliderwatch.estimation.measurement import OWN, SIDE, SLIP, Guess, Linear, drag_slip, measure
 from gliderwatch.estimation.noise import learn_doubt, learn_sea
@@ -156,19 +156,24 @@ def step(
     if state is None or (state.end is not None and are_apart(state.end, dive.start)):
         state = init(params, (seen.start + seen.end) / 2)
     kept, state = _predicted(state, seen, hint, params)
-    as_expected, as_seen = _measured(state, seen, params, usual)
     believed = seen.own_speed()
+    about = _about(state, believed)
+    as_expected, as_seen = _measured(state, seen, about, params, usual)
     told_own = None if tells is None else Told(tells, state.x)
-    chances = odds(
+    found = odds(
         as_expected, as_seen, state.cov, believed[0] if believed else None, params.surprises, told_own
     )
-    cause = max(chances, key=lambda each: chances[each])
-    across = _across(state, seen)
+    cause = max(found, key=lambda each: found[each].chance)
+    across = _across(state, seen, about)
     sea, doubt = _learnt(state, as_seen, cause, across)
     linear = as_expected if cause.is_error else as_seen
-    after, update, believes = _updated(state, linear, cause, params, told_own)
-    # a step that shows at a turn looks like another flow: let the test see it as if it were none
-    tested = _updated(state, as_seen, Cause.USUAL, params, told_own)[1] if cause is Cause.FLOW else update
+    after, update = _updated(state, linear, cause, params, told_own if found[cause].believes else None)
+    tested = update
+    if (
+        cause is Cause.FLOW
+    ):  # a step that shows at a turn looks like one: let the test see it as if it were none
+        as_told = told_own if found[Cause.USUAL].believes else None
+        tested = _updated(state, as_seen, Cause.USUAL, params, as_told)[1]
     loss, turn, bank = hidden.steps(state.bank, kept, tested, sea, params.front)
     told = hidden.told(loss, turn, params.alarms_per_month)
     after = _opened(replace(after, sea=sea, doubt=doubt, bank=bank, end=dive.end), told)
@@ -178,8 +183,8 @@ def step(
         single_sigma=believed[1] * math.sqrt(state.doubt) if believed else math.inf,
         across=across,
         cause=cause,
-        odds={str(each): chance for each, chance in chances.items()},
-        believes=believes,
+        odds={str(each): odd.chance for each, odd in found.items()},
+        believes=found[cause].believes,
         nis=float(update.innovation @ update.weight @ update.innovation),
         dof=len(update.innovation),
         loss=loss,
@@ -208,21 +213,20 @@ def _predicted(
     return kept, replace(state, t=t, x=kept * state.x, cov=cov)
 
 
-def _about(state: JointState, seen: Observation) -> float:
+def _about(state: JointState, believed: tuple[float, float] | None) -> float:
     """The own speed (m/s) about which the filter is linear: as seen on the dive, where that can be."""
-    believed = seen.own_speed()
     if believed is not None and SLOWEST < believed[0] < FASTEST:
         return believed[0]
     return max(float(state.x[OWN]), SLOWEST)
 
 
 def _measured(
-    state: JointState, seen: Observation, params: JointParams, usual: float | None
+    state: JointState, seen: Observation, about: float, params: JointParams, usual: float | None
 ) -> tuple[Linear, Linear]:
     """The measurements of a dive, linear about the own speed that was expected, and about the one seen."""
     as_expected, as_seen = (
         measure(seen, state.x, _guess(state, seen, own, params, usual), state.doubt, params.flow)
-        for own in (max(float(state.x[OWN]), SLOWEST), _about(state, seen))
+        for own in (max(float(state.x[OWN]), SLOWEST), about)
     )
     return as_expected, as_seen
 
@@ -238,14 +242,13 @@ def _guess(
 
 def _updated(
     state: JointState, linear: Linear, cause: Cause, params: JointParams, told: Told | None
-) -> tuple[JointState, Update, bool]:
-    """The state after the measurements of a dive, explained by a cause; and whether W as told is in it."""
-    size = params.surprises.of(cause).size
-    believes = told is not None and is_believed(linear, state.cov, cause, size, told)
+) -> tuple[JointState, Update]:
+    """The state after the measurements of a dive, and W as ``told``, explained by a cause."""
+    size = params.surprises.by_cause()[cause].size
     if cause is Cause.CURRENT:
         linear = linear.first(2)  # a current that is wrong is left out, be it as near as it may
     linear, cov = opened(linear, state.cov, cause, size)
-    if believes and told is not None:
+    if told is not None:
         linear = linear.with_own(told.x, told.tells)
     rows, e = linear.rows, linear.innovation
     weight = np.asarray(np.linalg.inv(rows @ cov @ rows.T + linear.noise), dtype=np.float64)
@@ -261,7 +264,7 @@ def _updated(
         nis=state.nis + counts * float(e @ weight @ e),
         dof=state.dof + counts * len(e),
     )
-    return state, Update(rows, gain, weight, e), believes
+    return state, Update(rows, gain, weight, e)
 
 
 def _learnt(
@@ -278,8 +281,8 @@ def _learnt(
     return learn_sea(state.sea, square, state.dives), learn_doubt(state.doubt, aside, state.dives)
 
 
-def _across(state: JointState, seen: Observation) -> tuple[float, float] | None:
-    found = seen.across(_about(state, seen))
+def _across(state: JointState, seen: Observation, about: float) -> tuple[float, float] | None:
+    found = seen.across(about)
     return None if found is None else (found[0], found[1] * math.sqrt(state.doubt))
 
 
@@ -290,8 +293,9 @@ def _opened(state: JointState, told: Step | None) -> JointState:
     """
     if told is None:
         return state
-    cov = state.cov + told.cov + np.outer(told.shift, told.shift) / 4
-    return replace(state, x=readonly(state.x + told.shift), cov=readonly(cov), bank=Bank())
+    shift = told.shift
+    cov = state.cov + told.cov + np.outer(shift, shift) / 4
+    return replace(state, x=readonly(state.x + shift), cov=readonly(cov), bank=Bank())
 
 
 def _estimate(state: JointState, seen: Observation, params: JointParams, usual: float | None) -> Estimate:

@@ -67,7 +67,8 @@ def measure(seen: Observation, x: Array, guess: Guess, doubt: float, flow: FlowP
     rows[:2, : flow.size] = rows[2:, : flow.size] = mean_flow(seen.start, seen.end, flow)
     rows[2:, OWN] = -(guess.slip + x[SLIP]) * h - x[SIDE] * aside
     rows[:2, OWN] = h + rows[2:, OWN]
-    rows[:, SLIP], rows[:, SIDE] = np.tile(-own * h, 2), np.tile(-own * aside, 2)
+    rows[:2, SLIP] = rows[2:, SLIP] = -own * h
+    rows[:2, SIDE] = rows[2:, SIDE] = -own * aside
     noise = np.zeros((4, 4))
     noise[:2, :2] = seen.ground_cov + own**2 * seen.heading_cov
     noise[2:, 2:] = seen.current_sigma**2 * np.eye(2)

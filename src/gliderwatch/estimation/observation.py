@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from statistics import median
 
 import numpy as np
 
 from gliderwatch.model import Array, Dive, Fix, readonly
-from gliderwatch.navigation.frame import to_plane
+from gliderwatch.navigation.frame import way
 
 GPS = 5.0
 """Metres, a component: error of a fix."""
@@ -131,7 +132,7 @@ def are_apart(end: Fix, start: Fix) -> bool:
     False
     """
     gap = start.t - end.t
-    moved = float(np.hypot(*to_plane(start.lat, start.lon, end.lat, end.lon)))
+    moved = float(np.hypot(*way(start.lat, start.lon, end.lat, end.lon)))
     return gap > NEW_AFTER or moved > CARRIED * max(gap, 600.0)
 
 
@@ -174,5 +175,5 @@ def _unseen(dt: Array) -> float:
     """The part of a flight within gaps between headings, of the intervals ``dt`` (s) between them."""
     if not len(dt):
         return 1.0
-    gaps = dt > max(GAP, GAP_IN_CADENCES * float(np.median(dt)))
+    gaps = dt > max(GAP, GAP_IN_CADENCES * median(dt.tolist()))
     return float(dt[gaps].sum() / dt.sum())

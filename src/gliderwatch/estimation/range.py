@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,8 +101,8 @@ def _alike(normal: Normal, at: float) -> NDArray[np.bool_]:
 
 
 def _range(speeds: Array, params: RangeParams) -> SpeedRange:
-    usual = float(np.median(speeds))
-    spread = params.width * MAD_TO_SIGMA * float(np.median(np.abs(speeds - usual)))
+    usual = median(speeds.tolist())
+    spread = params.width * MAD_TO_SIGMA * median(np.abs(speeds - usual).tolist())
     below = min(max(spread, params.narrowest * usual), params.widest * usual)
     above = max(spread, params.above * usual)
     return SpeedRange(usual - below, usual, usual + above, len(speeds))

@@ -12,7 +12,7 @@ from gliderwatch.forecast import timing
 from gliderwatch.forecast.state import CHI2, Place, Surfacings, bearing, factor, is_same, plan
 from gliderwatch.forecast.steering import courses
 from gliderwatch.model import Array, Dive, Expected, Fix
-from gliderwatch.navigation.frame import to_plane
+from gliderwatch.navigation.frame import way
 
 FEW, MANY, HELD = 5, 30, 16
 """Dives that tell habits, dives that tell errors, and waypoints of the past that are remembered."""
@@ -68,8 +68,8 @@ def ground(dive: Dive) -> Array | None:
     """Velocity over ground (m/s, (2,)) between the fixes of a dive; None where one is not known or stale."""
     if dive.start is None or dive.end is None or _is_stale(dive):
         return None
-    way = to_plane(dive.end.lat, dive.end.lon, dive.start.lat, dive.start.lon)
-    return np.asarray(way / max(dive.end.t - dive.start.t, 1.0))
+    moved = way(dive.end.lat, dive.end.lon, dive.start.lat, dive.start.lon)
+    return np.asarray(moved / max(dive.end.t - dive.start.t, 1.0))
 
 
 def _timed(state: Surfacings, dive: Dive, end: Fix) -> Surfacings:
@@ -113,7 +113,7 @@ def _misses(state: Surfacings, dive: Dive, end: Fix, expected: Expected | None) 
         return state.misses
     if state.fix is None or expected.after != state.fix.t:
         return state.misses
-    off = to_plane(end.lat, end.lon, expected.lat, expected.lon)
+    off = way(end.lat, end.lon, expected.lat, expected.lon)
     cov = np.array([[expected.east, expected.cross], [expected.cross, expected.north]])
     distance = math.sqrt(float(off @ np.linalg.solve(cov, off)) / CHI2) * factor(state.misses)
     return (*state.misses, distance)[-MANY:]
@@ -141,8 +141,8 @@ def _adrift(state: Surfacings, before: Fix | None, dive: Dive) -> Surfacings:
     time = dive.start.t - before.t
     if time < LONG_DRIFT or is_unseen(dive):
         return state
-    way = to_plane(dive.start.lat, dive.start.lon, before.lat, before.lon)
-    beside = way / time - state.current  # that of the dive before
+    moved = way(dive.start.lat, dive.start.lon, before.lat, before.lon)
+    beside = moved / time - state.current  # that of the dive before
     east, north = (1 - CALM) * np.array(state.drift) + CALM * np.clip(beside, -FASTEST_DRIFT, FASTEST_DRIFT)
     return replace(state, drift=(float(east), float(north)))
 

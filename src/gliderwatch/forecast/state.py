@@ -11,7 +11,7 @@ import numpy as np
 from gliderwatch.forecast.steering import WAYS, Plan
 from gliderwatch.forecast.timing import quantile
 from gliderwatch.model import Array, Fix
-from gliderwatch.navigation.frame import to_plane
+from gliderwatch.navigation.frame import way
 
 Place = tuple[float, float]
 """Latitude and longitude (degrees)."""
@@ -71,7 +71,7 @@ def is_same(a: Place, b: Place) -> bool:
     >>> is_same((38.3892, -73.5), (38.389, -73.5)), is_same((38.38, -73.5), (38.389, -73.5))
     (True, False)
     """
-    return abs(a[0] - b[0]) < FAR and (a == b or float(np.hypot(*to_plane(*a, *b))) < NEAR)
+    return abs(a[0] - b[0]) < FAR and (a == b or float(np.hypot(*way(*a, *b))) < NEAR)
 
 
 def goals(state: Surfacings) -> tuple[Array, ...]:
@@ -80,7 +80,7 @@ def goals(state: Surfacings) -> tuple[Array, ...]:
         return ()
     *past, now = state.waypoints
     after = [b for a, b in zip(past, state.waypoints[1:], strict=True) if is_same(a, now)]
-    return tuple(to_plane(*place, state.fix.lat, state.fix.lon) for place in (now, *after[-1:]))
+    return tuple(way(*place, state.fix.lat, state.fix.lon) for place in (now, *after[-1:]))
 
 
 def bearing(state: Surfacings) -> float | None:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from gliderwatch.forecast.state import Place
 from gliderwatch.model import Segment
+from gliderwatch.navigation.samples import joined
 
 Heard = tuple[tuple[float, float, float], ...]
 """Waypoints as they were told: time (s), latitude and longitude (degrees), in order of time."""
@@ -18,9 +17,8 @@ LATE = 300.0
 
 def heard(known: Heard, segment: Segment) -> Heard:
     """The waypoints told until now and those in one more segment; what changes nothing is left out."""
-    lat, lon = segment.get("waypoint_lat"), segment.get("waypoint_lon")
-    t, i, j = np.intersect1d(lat.t, lon.t, return_indices=True)
-    told = zip(t.tolist(), lat.v[i].tolist(), lon.v[j].tolist(), strict=True)
+    t, lat, lon = joined(segment.get("waypoint_lat"), segment.get("waypoint_lon"))
+    told = zip(t.tolist(), lat.tolist(), lon.tolist(), strict=True)
     out: list[tuple[float, float, float]] = []
     for report in sorted({*known, *told}):
         if not out or report[1:] != out[-1][1:]:

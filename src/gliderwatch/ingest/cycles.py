@@ -60,21 +60,30 @@ def intact(data: bytes, start: int, sensors: Sensors) -> tuple[int, int, int]:
     n_state = (len(sensors.sizes) + 3) // 4
     lowest, masks = _masks(sensors.sizes, n_state)
     n, end, after = -1, start, start + _KNOWN_BYTES
-    while after <= len(data):
+    size = len(data)
+    lengths: dict[bytes, int] = {}  # most cycles hold the same sensors as one before
+    while after <= size:
         tag = data[after : after + 1]
         if tag not in (_CYCLE, _END, b""):
-            return max(n, 0), end, len(data) - end
+            return max(n, 0), end, size - end
         n, end = n + 1, after
         first = after + 1
         after = first + n_state
-        if tag != _CYCLE or after > len(data):
+        if tag != _CYCLE or after > size:
             break
-        state = int.from_bytes(data[first:after], "big")
-        high = (state >> 1) & lowest
-        follows = high ^ (high & state)
-        for size, mask in masks:
-            after += size * (follows & mask).bit_count()
+        state = data[first:after]
+        if state not in lengths:
+            lengths[state] = _length(state, lowest, masks)
+        after += lengths[state]
     return max(n, 0), end, 0
+
+
+def _length(state: bytes, lowest: int, masks: list[tuple[int, int]]) -> int:
+    """Bytes of the values that follow the state bytes of a cycle; see `_masks`."""
+    number = int.from_bytes(state, "big")
+    high = (number >> 1) & lowest
+    follows = high ^ (high & number)
+    return sum(size * (follows & mask).bit_count() for size, mask in masks)
 
 
 def _masks(sizes: tuple[int, ...], n_state: int) -> tuple[int, list[tuple[int, int]]]:

@@ -9,7 +9,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cache
+from functools import cache, reduce
+from operator import and_, or_
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,21 +180,22 @@ def _clean(
         return {}, {}
     t, columns = _together(raw)
     with np.errstate(all="ignore"):
-        absent = np.logical_or.reduce([v == row.absent for row, v in zip(rows, columns, strict=True)])
+        absent = reduce(or_, [v == row.absent for row, v in zip(rows, columns, strict=True)])
         if rows[0].slocum_unit == _POSITION:  # what memory holds before the first fix: off Africa
-            absent |= np.logical_and.reduce([v == 0.0 for v in columns])
+            absent |= reduce(and_, [v == 0.0 for v in columns])
         values = [row.to_si(v) for row, v in zip(rows, columns, strict=True)]
         good = _within(t, *window) & ~absent
         for row, v in zip(rows, values, strict=True):
             good &= _within(v, row.low, row.high)
-    increasing, first = np.unique(t[good], return_index=True)
-    times = readonly(increasing)
-    lost = {
-        row.name: len(each[0]) - int(absent.sum()) - len(times) for row, each in zip(rows, raw, strict=True)
-    }
+    at = np.flatnonzero(good)
+    if not (t[at[1:]] > t[at[:-1]]).all():
+        at = at[np.unique(t[at], return_index=True)[1]]
+    times = readonly(t[at])
+    wanted = len(times) + int(np.count_nonzero(absent))
+    lost = {row.name: len(each[0]) - wanted for row, each in zip(rows, raw, strict=True)}
     if not len(times):
         return {}, lost
-    kept = {row.name: Series(times, readonly(v[good][first])) for row, v in zip(rows, values, strict=True)}
+    kept = {row.name: Series(times, readonly(v[at])) for row, v in zip(rows, values, strict=True)}
     return kept, lost
 
 
@@ -221,7 +224,7 @@ def _declination(quantities: Mapping[str, Series]) -> tuple[float | None, str]:
         variation = quantities["magnetic_variation"].v
         variation = variation[variation != 0.0]  # zero until the receiver has told
         if len(variation):
-            return -float(np.median(variation)), "glider"
+            return -median(variation.tolist()), "glider"
     for name in ("fix", "dr"):
         if f"{name}_lat" in quantities:
             lat, lon = quantities[f"{name}_lat"], quantities[f"{name}_lon"]

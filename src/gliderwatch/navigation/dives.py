@@ -7,13 +7,12 @@ and a dive is told again when more of it is known.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 from gliderwatch.model import Dive, Fix, Segment
 from gliderwatch.navigation.current import Known, Report, new_reports, pair, updated
-from gliderwatch.navigation.fixes import FASTEST, SUSPECT, distance, new_fixes
+from gliderwatch.navigation.fixes import FASTEST, SUSPECT, distance, new_fixes, stays
 from gliderwatch.navigation.flight import SPARSE, Flight, find_flight, lengthened, unseen
 from gliderwatch.navigation.quality import flight_notes, heading_gap, segment_notes, why_unusable
 from gliderwatch.navigation.samples import Samples, after, concatenated, get, prepare
@@ -73,23 +72,23 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
     fixes = new_fixes(samples, state.fix)
     state, told = _withdraw_old_fix(state, fixes)
     untold = [state.untold] if state.untold is not None else []
-    for fix in fixes:
-        flight = _flight_since(state, samples, fix)
+    for first, last in stays(fixes, DIP):
+        flight = _flight_since(state, samples, first)
         if flight is not None and flight.duration >= SHORTEST:
-            told.append(_dive(state, segment.id.glider, samples, flight, fix))
+            told.append(_dive(state, segment.id.glider, samples, flight, first))
         elif flight is not None and flight.duration >= DIP:
             untold.append(flight.end)
-        holes = tuple((max(a, fix.t), b) for a, b in state.holes if b > fix.t)
-        state = replace(state, fix=fix, holder=segment.id.name, holes=holes, notes=quality)
+        holes = tuple((max(a, last.t), b) for a, b in state.holes if b > last.t)
+        state = replace(state, fix=last, holder=segment.id.name, holes=holes, notes=quality)
 
     oldest = (state.last_t or 0.0) - LONGEST
     carry = after(samples, max(state.fix.t, oldest) if state.fix is not None else oldest)
     under_way = _flight_since(state, carry, None)
     told, waiting = _with_currents(told, untold, under_way, [*state.reports, *reports])
     waiting = [report for report in waiting if report.t > oldest]
-    last, later = (told[-1] if told else None), max(untold, default=None)
-    later = later if later is not None and (last is None or later > last.t_surface) else None
-    state = replace(state, carry=carry, reports=tuple(waiting), dive=last, untold=later)
+    latest, later = (told[-1] if told else None), max(untold, default=None)
+    later = later if later is not None and (latest is None or later > latest.t_surface) else None
+    state = replace(state, carry=carry, reports=tuple(waiting), dive=latest, untold=later)
     news = [d for d in told if d is not before]
     if under_way is not None and under_way.duration >= SHORTEST:
         news.append(_dive(state, segment.id.glider, carry, under_way, None))
@@ -162,9 +161,10 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
         flight = lengthened(flight, samples, end.t, state.holes)
     missing = sum(min(b, end.t) - a for a, b in state.holes if a < end.t) if end is not None else 0.0
     reason = why_unusable(samples, flight, start, end, missing)
-    track = None
-    numbers: Mapping[str, float] = {"duration_h": flight.duration / 3600} | attitude(samples, flight)
-    if start is not None and end is not None and not reason:
+    if start is None or end is None or reason:
+        track = None
+        numbers = {"duration_h": flight.duration / 3600} | attitude(samples, flight)
+    else:
         track = build_track(samples, flight, start, end)
         numbers = evidence(samples, flight, track)
         gap = heading_gap(samples, flight)
@@ -181,7 +181,7 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
         current=None,
         reason=reason,
         n_samples=len(get(samples, "heading_e").between(flight.start, flight.end)),
-        evidence=MappingProxyType(dict(numbers)),
+        evidence=MappingProxyType(numbers),
         notes=state.notes + flight_notes(flight, numbers),
     )
 

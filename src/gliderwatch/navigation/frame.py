@@ -8,11 +8,12 @@ of the two ends, so that displacements over a dive are right to better than a me
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gliderwatch.model import Array
+from gliderwatch.model import Array, readonly
 
 _SEMI_MAJOR = 6378137.0
 _ECCENTRICITY2 = 6.69437999014e-3
@@ -39,6 +40,12 @@ def to_plane(lat: float | Array, lon: float | Array, lat0: float, lon0: float) -
     meridian, parallel = radii((lat + lat0) / 2)
     dlon = (lon - lon0 + 180.0) % 360.0 - 180.0
     return np.stack([parallel * np.radians(dlon), meridian * np.radians(lat - lat0)], axis=-1)
+
+
+@lru_cache(maxsize=1024)
+def way(lat: float, lon: float, lat0: float, lon0: float) -> Array:
+    """`to_plane` of one point, shape (2,), remembered: fixes and waypoints come again and again."""
+    return readonly(to_plane(lat, lon, lat0, lon0))
 
 
 def from_plane(x: Sequence[float] | Array, lat0: float, lon0: float) -> tuple[float, float]:

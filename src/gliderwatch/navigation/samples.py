@@ -38,8 +38,7 @@ def compact(quantities: Mapping[str, Series]) -> dict[str, Series]:
     """
     out = {}
     for name, series in quantities.items():
-        starts = _bins(series.t)
-        if name.startswith(_EXACT) or len(starts) == len(series):
+        if name.startswith(_EXACT) or len(starts := _bins(series.t)) == len(series):
             out[name] = series
         elif name.startswith(_FIRST):
             out[name] = Series(readonly(series.t[starts]), readonly(series.v[starts]))
@@ -121,7 +120,7 @@ def after(samples: Samples, t: float) -> Samples:
     """The samples later than `t` (s)."""
     out = {}
     for name, series in samples.items():
-        i = int(np.searchsorted(series.t, t, "right"))
+        i = int(series.t.searchsorted(t, "right"))
         if i < len(series):
             out[name] = Series(series.t[i:], series.v[i:])
     return MappingProxyType(out)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import atan2, degrees
+from statistics import median
 
 import numpy as np
 
@@ -171,9 +172,9 @@ def _volumes(samples: Samples, flight: Flight) -> dict[str, float]:
     # the pump has moved most of the time: what lies between is it moving
     for name, part in (("ballast_dive", v[v < -PUMPED]), ("ballast_climb", v[v > PUMPED])):
         if len(part) >= FEW:
-            out[name] = float(np.median(part))
+            out[name] = median(part.tolist())
     vacuum = get(samples, "vacuum").between(flight.start, flight.end)
-    return out | ({"vacuum": float(np.median(vacuum.v))} if len(vacuum) else {})
+    return out | ({"vacuum": median(vacuum.v.tolist())} if len(vacuum) else {})
 
 
 def _depth_rates(depth: Series) -> dict[str, float]:
@@ -186,5 +187,5 @@ def _depth_rates(depth: Series) -> dict[str, float]:
     out = {}
     for name, part in (("depth_rate_dive", rate[rate > 0.02]), ("depth_rate_climb", rate[rate < -0.02])):
         if len(part) >= 2:
-            out[name] = float(np.median(part))
+            out[name] = median(part.tolist())
     return out
