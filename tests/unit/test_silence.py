@@ -31,16 +31,23 @@ ALONE = Fleet()
 
 class TestMargin:
     def test_one_missed_surfacing_and_its_call(self):
-        assert margin(expected(t=T0 + 6 * HOUR), None) == 6 * HOUR + 2400
+        assert margin(expected(t=T0 + 6 * HOUR), (), T0, None) == 6 * HOUR + 2400
 
     def test_never_below_three_hours_and_a_call(self):
-        assert margin(expected(t=T0 + 0.5 * HOUR), None) == 3 * HOUR + 2400
+        assert margin(expected(t=T0 + 0.5 * HOUR), (), T0, None) == 3 * HOUR + 2400
 
     def test_three_standard_errors_where_the_time_is_unsure(self):
-        assert margin(expected(t_sigma=2 * HOUR), None) == 6 * HOUR + 2400
+        assert margin(expected(t_sigma=2 * HOUR), (), T0, None) == 6 * HOUR + 2400
+
+    def test_from_file_to_file_where_that_is_more(self):
+        """The time at the surface, and each second file lost; but not a long silence."""
+        for gap, told in ((6.5, 6.5), (13.0, 13.0), (40.0, 6.0)):
+            signs = [Sign(T0 - k * gap * HOUR, T0, T0) for k in range(5)]
+            assert margin(expected(t=T0 + 6 * HOUR), signs, T0, None) == told * HOUR + 2400
+        assert margin(expected(t=T0 + 6 * HOUR), signs[:2], T0, None) == 6 * HOUR + 2400
 
     def test_as_configured_and_nothing_else(self):
-        assert margin(expected(t_sigma=2 * HOUR), 0.5) == 0.5 * HOUR
+        assert margin(expected(t_sigma=2 * HOUR), (), T0, 0.5) == 0.5 * HOUR
 
 
 class TestSignOfLife:

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from math import atan2, degrees, exp, inf, sqrt
-from statistics import median
+from statistics import median_low
 
 import numpy as np
 
@@ -26,6 +26,8 @@ COMMUNICATION = 2400.0
 """Seconds that a call takes at the most: its files come when it ends, not at the surfacing."""
 KEPT = 8
 """Files from which the interval is guessed where dives do not tell it."""
+LOSSY = 3.0
+"""Intervals from file to file, above which it was a silence and not one or two files that were lost."""
 SIGMAS = 3.0
 """Standard errors of the expected time that belong to the margin."""
 FRESH = 2 * 86400.0
@@ -79,24 +81,33 @@ class Awaited:
         return k
 
 
-def margin(expected: Expected, overdue_hours: float | None) -> float:
+def margin(expected: Expected, signs: Iterable[Sign], now: float, overdue_hours: float | None) -> float:
     """Seconds after the expected time until a glider is overdue: as configured, else so long that neither
     one missed surfacing (or one lost file) nor the uncertainty of the time matters."""
     if overdue_hours is not None:
         return overdue_hours * HOUR
-    return max(LEAST_MARGIN, SIGMAS * expected.t_sigma, expected.t - expected.after) + COMMUNICATION
+    interval = expected.t - expected.after
+    usual = rhythm(signs, now, LOSSY * interval) or interval
+    return max(LEAST_MARGIN, SIGMAS * expected.t_sigma, interval, usual) + COMMUNICATION
+
+
+def rhythm(signs: Iterable[Sign], now: float, longest: float = inf) -> float | None:
+    """Seconds from one file that comes to the next, usually: with the stay at the surface, and with the file
+    between them where every other one is lost. After ``longest`` it is a silence. None: too few known."""
+    opened = sorted(s.opened_at for s in signs if s.opened_at <= now)[-KEPT:]
+    gaps = [b - a for a, b in pairwise(opened) if COMMUNICATION / 2 < b - a < longest]
+    return median_low(gaps) if len(gaps) > 1 else None
 
 
 def guess(signs: Iterable[Sign], now: float) -> Expected | None:
     """The next surfacing of a glider whose dives cannot be used: as long after its last sign of life as its
     last files were opened apart; None where too few are known."""
     known = [s for s in signs if s.opened_at <= now]
-    opened = sorted(s.opened_at for s in known)[-KEPT:]
-    gaps = [b - a for a, b in pairwise(opened) if b - a > COMMUNICATION / 2]
-    if len(gaps) < 2:
+    interval = rhythm(known, now)
+    if interval is None:
         return None
-    interval = median(gaps)
-    after = max((t for t in (s.time(interval) for s in known) if t <= now), default=opened[-1])
+    last = max(s.opened_at for s in known)
+    after = max((t for t in (s.time(interval) for s in known) if t <= now), default=last)
     return Expected(after, after + interval, interval / 2, None, None, 0.0, 0.0, 0.0, "its last files")
 
 
@@ -106,10 +117,10 @@ def awaited(expected: Expected, signs: Iterable[Sign], now: float, overdue_hours
     A sign of life of a later call than the one that `expected` rests upon (a file that waits for its
     cache, a dive without a fix) puts the next one off: one interval from there.
     """
-    interval = expected.t - expected.after
+    signs, interval = tuple(signs), expected.t - expected.after
     heard = max([expected.after, *(t for t in (s.time(interval) for s in signs) if t <= now)])
     t = heard + interval if heard > expected.after + interval / 2 else expected.t
-    return Awaited(heard, t, t + margin(expected, overdue_hours), interval)
+    return Awaited(heard, t, t + margin(expected, signs, now, overdue_hours), interval)
 
 
 def is_at_sea(signs: Iterable[Sign], interval: float, now: float) -> bool:
