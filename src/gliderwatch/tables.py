@@ -136,8 +136,11 @@ def _next(g: GliderStatus) -> list[tuple[str, str]]:
         return [("dim", f"{name}: recovered, nothing is told of it")]
     if g.is_muted and g.attention.muted_until is not None:
         told = [("dim", f"{name}: muted until {utc(g.attention.muted_until)}")]
-    if call is None or not g.configured:
+    if not g.configured:
         return told
+    if call is None:
+        why = "no dive yet" if g.latest is None else "its next surfacing cannot be said yet"
+        return [*told, ("dim", f"{name}: not missed while it is silent, {why}")]
     if g.is_over:
         return [*told, ("dim", f"{name}: last heard {utc(call.heard)}, its deployment seems over")]
     silent = duration(g.at - call.heard)

@@ -176,6 +176,7 @@ def test_status_tells_gliders_and_files(site: Site) -> None:
         line for line in shown.splitlines() if line.startswith("angus")
     )
     assert "no dive yet" in next(line for line in shown.splitlines() if line.startswith("bruce"))
+    assert "bruce: not missed while it is silent, no dive yet" in shown.splitlines()
     assert max(map(len, shown.splitlines())) <= 80
 
 
