@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import structlog
@@ -12,6 +13,7 @@ import gliderwatch
 from acceptance.support import lacks_key
 from alert_support import alert
 from gliderwatch.alerts.outbox import OutboxRow, _about
+from gliderwatch.model import Severity
 from gliderwatch.run import logs
 from gliderwatch.run.intake import Taken
 from gliderwatch.store.sqlite import File, Status
@@ -72,6 +74,16 @@ def test_what_is_told_of_files_and_messages_has_their_keys() -> None:
             logs.log.info("alert delivered", **_about(OutboxRow(1, each, "mail", 0)))
     assert [lacks_key(line, {"bruce"}) for line in lines] == [None] * 5
     assert [line.get("glider") for line in lines] == ["bruce", "bruce", None, "bruce", None]
+
+
+def test_a_notice_of_a_surfacing_is_no_warning() -> None:
+    with structlog.testing.capture_logs() as lines:
+        logs.alerts([replace(alert(), severity=severity) for severity in Severity])
+    assert [(s, line["log_level"]) for s, line in zip(Severity, lines, strict=True)] == [
+        (Severity.INFO, "info"),
+        (Severity.WARNING, "warning"),
+        (Severity.CRITICAL, "warning"),
+    ]
 
 
 def test_a_line_without_its_key_is_noticed() -> None:

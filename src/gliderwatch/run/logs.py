@@ -12,7 +12,7 @@ from typing import Any, TextIO, cast
 import structlog
 
 from gliderwatch.alerts.words import clean
-from gliderwatch.model import Alert
+from gliderwatch.model import Alert, Severity
 from gliderwatch.run.intake import Taken
 
 log = structlog.get_logger(__name__)
@@ -100,5 +100,9 @@ def taken(input_: Taken) -> None:
 def alerts(made: Iterable[Alert]) -> None:
     """Messages that are on their way."""
     for alert in made:
-        glider = {"glider": alert.glider} if alert.glider else {}  # else it is for the operator
-        log.warning("alert", alert=alert.id, **glider, kind=str(alert.kind), title=alert.title)
+        about = {"glider": alert.glider} if alert.glider else {}  # else it is for the operator
+        about |= {"alert": alert.id, "kind": str(alert.kind), "title": alert.title}
+        if alert.severity is Severity.INFO:
+            log.info("alert", **about)
+        else:
+            log.warning("alert", **about)
