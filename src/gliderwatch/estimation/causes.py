@@ -90,10 +90,10 @@ class Told:
 
 @dataclass(frozen=True, slots=True)
 class Odds:
-    """Probability of a cause, and whether W as the glider tells it fits if that is the cause."""
+    """Probability of a cause, and W as the glider tells it, if that fits where this is the cause."""
 
     chance: float
-    believes: bool
+    told: Told | None
 
 
 def odds(
@@ -128,7 +128,7 @@ def odds(
     most = max(logs)
     total = sum(exp(each - most) for each in logs)
     return {
-        cause: Odds(exp(each - most) / total, right[i] > without[i])
+        cause: Odds(exp(each - most) / total, told if right[i] > without[i] else None)
         for i, (cause, each) in enumerate(zip(possible, logs, strict=True))
     }
 

@@ -159,21 +159,18 @@ def step(
     believed = seen.own_speed()
     about = _about(state, believed)
     as_expected, as_seen = _measured(state, seen, about, params, usual)
+    own = believed[0] if believed else None
     told_own = None if tells is None else Told(tells, state.x)
-    found = odds(
-        as_expected, as_seen, state.cov, believed[0] if believed else None, params.surprises, told_own
-    )
+    found = odds(as_expected, as_seen, state.cov, own, params.surprises, told_own)
     cause = max(found, key=lambda each: found[each].chance)
     across = _across(state, seen, about)
     sea, doubt = _learnt(state, as_seen, cause, across)
     linear = as_expected if cause.is_error else as_seen
-    after, update = _updated(state, linear, cause, params, told_own if found[cause].believes else None)
+    after, update = _updated(state, linear, cause, params, found[cause].told)
     tested = update
-    if (
-        cause is Cause.FLOW
-    ):  # a step that shows at a turn looks like one: let the test see it as if it were none
-        as_told = told_own if found[Cause.USUAL].believes else None
-        tested = _updated(state, as_seen, Cause.USUAL, params, as_told)[1]
+    if cause is Cause.FLOW:
+        # a step that shows at a turn looks like another flow: let the test see it as if it were none
+        _, tested = _updated(state, as_seen, Cause.USUAL, params, found[Cause.USUAL].told)
     loss, turn, bank = hidden.steps(state.bank, kept, tested, sea, params.front)
     told = hidden.told(loss, turn, params.alarms_per_month)
     after = _opened(replace(after, sea=sea, doubt=doubt, bank=bank, end=dive.end), told)
@@ -184,7 +181,7 @@ def step(
         across=across,
         cause=cause,
         odds={str(each): odd.chance for each, odd in found.items()},
-        believes=found[cause].believes,
+        believes=found[cause].told is not None,
         nis=float(update.innovation @ update.weight @ update.innovation),
         dof=len(update.innovation),
         loss=loss,

@@ -75,8 +75,8 @@ def prepare(segment: Segment, declination: float) -> Samples:
     Keys: ``fix_lat, fix_lon, dr_lat, dr_lon`` (degrees), ``heading_e, heading_n`` (unit vectors;
     the commanded heading where the measured one is absent), ``pitch, roll`` (rad), ``depth`` (m),
     ``speed_onboard`` (m/s), ``dr_state``, ``dr_time`` (s), ``thruster_on`` (0 to 1; by its power where the
-    setting is absent), ``vacuum`` (Pa),
-    ``ballast``, ``oil_volume`` (m3); ``commanded``, 1 at each heading that is a commanded one.
+    setting is absent), ``vacuum`` (Pa), ``ballast``, ``oil_volume`` (m3); ``commanded``, 1 at each heading
+    that is a commanded one.
     """
     source = "heading" if len(segment.get("heading")) else "heading_commanded"
     wanted = (*_KEPT, "thruster_power", source, *(name for pair in _PAIRS for name in pair))

@@ -136,6 +136,15 @@ def next_tick(
     return None if silence is None else silence.awaited.stage(silence.told)
 
 
+def outlook(known: Known, now: float) -> tuple[Expected, tuple[Sign, ...]] | None:
+    """What is expected of a glider in the water at `now` (s), and its signs of life; None: nothing."""
+    signs = known.signs(now - RECENT)
+    expected = known.expected(now) or guess(signs, now)
+    if expected is None or not is_launched(signs, known.has_dived(now - RECENT)):
+        return None
+    return expected, signs
+
+
 def _going_on(
     silences: tuple[Silence, ...], known: Known, overdue_hours: float | None, now: float
 ) -> Silence | None:
@@ -143,10 +152,10 @@ def _going_on(
     told = next((s for s in silences if s.called is None), None)
     if told is not None:
         return told
-    signs = known.signs(now - RECENT)
-    expected = known.expected(now) or guess(signs, now)
-    if expected is None or not is_launched(signs, known.has_dived(now - RECENT)):
+    found = outlook(known, now)
+    if found is None:
         return None
+    expected, signs = found
     call = awaited(expected, signs, now, overdue_hours)
     if not is_at_sea(signs, call.interval, now):
         return None

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
 from gliderwatch.currents.field import Field
 from gliderwatch.errors import GliderwatchError, Quarantine
-from gliderwatch.model import Alert, Assessment, Expected, Segment, SegmentId
+from gliderwatch.model import Alert, Assessment, Segment, SegmentId
 from gliderwatch.params import Attention, GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
 from gliderwatch.rules import overdue, silence
 from gliderwatch.rules.announce import due
-from gliderwatch.rules.overdue import RECENT
 from gliderwatch.store.sqlite import File, Status, Store
 
 
@@ -101,23 +100,13 @@ def tick(
     if due_at is None or due_at > now:
         return ()
     with store.transaction():
-        fleet = silence.fleet(_outlooks(store, others, now), now)
+        outlooks = (overdue.outlook(store.known(other), now) for other in others)
+        fleet = silence.fleet(filter(None, outlooks), now)
         said, hours = store.said(glider), speaking.attention(glider).overdue_hours
         silences, alerts = overdue.tick(said.silences, store.known(glider), fleet, hours, now)
         if silences != said.silences:
             store.say(glider, replace(said, silences=silences), alerts, speaking.channels, now)
     return tuple(alerts)
-
-
-def _outlooks(
-    store: Store, gliders: Iterable[str], now: float
-) -> Iterator[tuple[Expected, tuple[silence.Sign, ...]]]:
-    """What is expected of gliders at `now` (s), and their signs of life; of those of which it is known."""
-    for known in map(store.known, gliders):
-        signs = known.signs(now - RECENT)
-        expected = known.expected(now) or silence.guess(signs, now)
-        if expected is not None and silence.is_launched(signs, known.has_dived(now - RECENT)):
-            yield expected, signs
 
 
 def next_tick(store: Store, glider: str, speaking: Speaking, now: float) -> float | None:
