@@ -9,7 +9,7 @@ from gliderwatch.model import Kind
 
 UNKNOWN = "unknown"
 INCIDENTS = {Kind.ANOMALY: "anomaly", Kind.FALSE_ALARM: "disagreement of measurements"}
-"""Kinds of incidents for pilots. The papers' word for the second is no title of a warning: it reads as "ignore"."""
+"""Kinds of incidents for pilots. The papers' word for the second, false alarm, would read as "ignore"."""
 
 
 def clean(text: str, limit: int = 200) -> str:

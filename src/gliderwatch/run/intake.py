@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
 from gliderwatch.currents.field import Field
-from gliderwatch.errors import GliderwatchError, Quarantine
+from gliderwatch.errors import GliderwatchError, NotAssessed
 from gliderwatch.model import Alert, Assessment, Segment, SegmentId
 from gliderwatch.params import Attention, GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
@@ -149,7 +149,7 @@ def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: 
         return process(state, segment, params, ocean)
     except Exception as error:
         what = f"{type(error).__name__}: {error}"
-        raise Quarantine(f"cannot be assessed, please report it ({segment.id.name}: {what})") from error
+        raise NotAssessed(f"cannot be assessed, please report it ({segment.id.name}: {what})") from error
 
 
 def _speak(

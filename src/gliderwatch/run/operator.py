@@ -13,14 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from gliderwatch.alerts import message
-from gliderwatch.alerts.smtp import PARTLY
 from gliderwatch.alerts.words import duration, utc
 from gliderwatch.config import Config
 from gliderwatch.config.service import Operator as Settings
 from gliderwatch.model import Alert, Severity
 from gliderwatch.run.speaking import Waits, waits
 from gliderwatch.store.database import guarded, read_only
-from gliderwatch.store.outbox import REFUSED, released
+from gliderwatch.store.outbox import delivery, released
 from gliderwatch.store.sqlite import Store
 
 DAY, HOUR = 86400.0, 3600.0
@@ -128,17 +127,17 @@ def failing(state: Path, now: float) -> dict[str, Failing]:
     `now` (s) and have delivered none since. What is held does not wait before it is due, and a message that
     some of a channel's addresses took has been told: the report of the refusal names the others."""
     with reading(state) as db:
-        since = f"max(a.made_at, {released(db)})"
+        since, how = f"max(a.made_at, {released(db)})", delivery(db)
         sql = (
             "SELECT channel, min(since), count(*), error FROM ("
             f"SELECT o.channel, {since} AS since, o.error FROM outbox o JOIN alerts a ON a.id = o.alert "
             "WHERE o.delivered_at IS NULL AND o.attempts > 0 UNION ALL "
             f"SELECT o.channel, {since} AS since, o.error FROM outbox o JOIN alerts a ON a.id = o.alert "
-            "WHERE o.delivered_at > ?1 AND o.error LIKE ?2 || '%' AND o.error NOT LIKE ?2 || ?3 || '%' "
+            f"WHERE o.delivered_at > ? AND {how} = 'refused' "
             "AND NOT EXISTS (SELECT 1 FROM outbox l WHERE l.delivered_at > o.delivered_at "
-            "AND l.channel = o.channel AND l.error = '')) GROUP BY channel"
+            f"AND l.channel = o.channel AND {how} = 'delivered')) GROUP BY channel"
         )
-        return {row[0]: Failing(*row[1:]) for row in db.execute(sql, (now - DAY, REFUSED, PARTLY))}
+        return {row[0]: Failing(*row[1:]) for row in db.execute(sql, (now - DAY,))}
 
 
 def quarantined(state: Path, since: float) -> int:

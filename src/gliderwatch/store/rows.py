@@ -22,9 +22,22 @@ class Status(StrEnum):
     UNKNOWN = "unknown"
 
 
+class Hindrance(StrEnum):
+    """Why a file was not taken, for decisions."""
+
+    NO_CACHE = "no_cache"
+    UNREADABLE = "unreadable"
+    GONE = "gone"
+    RENAMED = "renamed"
+    DAMAGED = "damaged"
+    NOT_ASSESSED = "not_assessed"
+
+
 @dataclass(frozen=True, slots=True)
 class File:
-    """A row of the ledger: ``reason`` says in words why it was not taken, ``crc`` the cache waited for.
+    """A row of the ledger: ``hindrance`` and, in words, ``reason`` say why it was not taken.
+
+    ``crc`` names the cache file that it waits for.
 
     ``opened_at`` (s) of its header is not in the row: it makes the file a sign of life when it is noted.
     """
@@ -37,6 +50,7 @@ class File:
     segment: str = ""
     reason: str = ""
     crc: str = ""
+    hindrance: Hindrance | None = None
     opened_at: float | None = field(default=None, compare=False)
 
 
@@ -59,7 +73,9 @@ class Undelivered:
 def file_of(row: sqlite3.Row) -> File:
     """The row of the ledger."""
     names = ("path", "size", "mtime_ns", "glider", "segment", "reason", "crc")
-    return File(status=Status(row["status"]), **{name: row[name] for name in names})
+    why = row["hindrance"] if "hindrance" in row.keys() else ""  # noqa: SIM118 (a row is no mapping)
+    hindrance = Hindrance(why) if why else None
+    return File(status=Status(row["status"]), hindrance=hindrance, **{name: row[name] for name in names})
 
 
 def values(db: sqlite3.Connection, sql: str, arguments: tuple[object, ...], kind: type[T]) -> list[T]:
