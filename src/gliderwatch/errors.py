@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 
 
 class GliderwatchError(Exception):
@@ -21,12 +20,12 @@ class MissingCache(Retry):
     where it was looked for.
     """
 
-    def __init__(self, crc: str, folders: Iterable[Path] = ()) -> None:
-        self.crc, self.folders = crc, tuple(folders)
-        where = f"not in {', '.join(map(str, self.folders))}" if self.folders else "no folder is searched"
+    def __init__(self, crc: str, folders: Iterable[object] = ()) -> None:
+        self.crc, self.folders = crc, tuple(map(str, folders))
+        where = f"not in {', '.join(self.folders)}" if self.folders else "no folder is searched"
         super().__init__(f"cache file {crc}.cac is missing: {where}")
 
-    def __reduce__(self) -> tuple[type[MissingCache], tuple[str, tuple[Path, ...]]]:
+    def __reduce__(self) -> tuple[type[MissingCache], tuple[str, tuple[str, ...]]]:
         """What it is made of, so that it comes whole out of a worker process."""
         return type(self), (self.crc, self.folders)
 

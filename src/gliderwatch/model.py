@@ -87,6 +87,17 @@ class Segment:
         return self.quantities.get(name, EMPTY)
 
 
+class Hindrance(StrEnum):
+    """Why a file was not taken, for decisions."""
+
+    NO_CACHE = "no_cache"
+    UNREADABLE = "unreadable"
+    GONE = "gone"
+    RENAMED = "renamed"
+    DAMAGED = "damaged"
+    NOT_ASSESSED = "not_assessed"
+
+
 # --------------------------------------------------------------------------- navigation
 
 
@@ -242,6 +253,7 @@ class Kind(StrEnum):
     REMINDER = "reminder"
     CORRECTION = "correction"
     OVERDUE = "overdue"
+    UNKNOWN = "unknown"
     SURFACING = "surfacing"
     OPERATOR = "operator"
 

@@ -10,8 +10,9 @@ from gliderwatch.errors import MissingCache, NotAssessed, Quarantine, Retry
 from gliderwatch.ingest.caches import find_cache
 from gliderwatch.ingest.header import read_header
 from gliderwatch.ingest.settle import Settling
+from gliderwatch.model import Hindrance
 from gliderwatch.run.backlog import Job
-from gliderwatch.store.sqlite import File, Hindrance, Status, Store
+from gliderwatch.store.sqlite import File, Status, Store
 
 DONE = (Status.TAKEN, Status.DUPLICATE, Status.QUARANTINED)
 

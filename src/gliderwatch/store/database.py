@@ -62,13 +62,14 @@ CREATE INDEX outbox_by_delivery ON outbox (delivered_at);
     5: f"""
 ALTER TABLE outbox ADD COLUMN delivery TEXT NOT NULL DEFAULT 'pending';  -- `alerts.worker.Delivery`
 UPDATE outbox SET delivery = {DELIVERY_BY_WORDS};
-ALTER TABLE files ADD COLUMN hindrance TEXT NOT NULL DEFAULT '';  -- why it is not taken: `rows.Hindrance`
+ALTER TABLE files ADD COLUMN hindrance TEXT NOT NULL DEFAULT '';  -- why it is not taken: `model.Hindrance`
 UPDATE files SET hindrance = CASE WHEN status = 'duplicate' AND reason = 'was renamed' THEN 'renamed'
     WHEN status = 'waiting' AND crc != '' THEN 'no_cache'
     WHEN status = 'waiting' AND reason LIKE 'is not there any more%' THEN 'gone'
     WHEN status = 'waiting' THEN 'unreadable'
     WHEN status = 'quarantined' AND reason LIKE 'cannot be assessed%' THEN 'not_assessed'
     WHEN status = 'quarantined' THEN 'damaged' ELSE '' END;
+CREATE INDEX files_by_segment ON files (glider, segment);
 """,
 }
 """SQL that leads from the schema before to the one of the key. A state file is never written by an older

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TypeVar
 
+from gliderwatch.model import Hindrance
 from gliderwatch.store import codec
 
 T = TypeVar("T")
@@ -20,17 +21,6 @@ class Status(StrEnum):
     WAITING = "waiting"
     QUARANTINED = "quarantined"
     UNKNOWN = "unknown"
-
-
-class Hindrance(StrEnum):
-    """Why a file was not taken, for decisions."""
-
-    NO_CACHE = "no_cache"
-    UNREADABLE = "unreadable"
-    GONE = "gone"
-    RENAMED = "renamed"
-    DAMAGED = "damaged"
-    NOT_ASSESSED = "not_assessed"
 
 
 @dataclass(frozen=True, slots=True)

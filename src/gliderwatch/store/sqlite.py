@@ -14,10 +14,10 @@ from gliderwatch.store import codec, outbox, retention
 from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, read_only
 from gliderwatch.store.known import Known
 from gliderwatch.store.notes import Notes
-from gliderwatch.store.rows import File, Hindrance, Status, Undelivered, file_of, values
+from gliderwatch.store.rows import File, Status, Undelivered, file_of, values
 from gliderwatch.store.segments import RECENT, Segments
 
-__all__ = ["File", "Hindrance", "Known", "Status", "Store", "Undelivered"]
+__all__ = ["File", "Known", "Status", "Store", "Undelivered"]
 
 
 class Store:
