@@ -27,13 +27,16 @@ INTERVALS = 2.0
 """Intervals between surfacings until a dive is judged, at most: the fix that ends it, and its current,
 come with the file after it."""
 THINNED = 7.0
-"""Reminders come after 1, 2 and 4 times `reminder_hours`, and then each time after so many of them."""
+"""Reminders come after 1, 2 and 4 times `reminder_hours`, then each time after so many of them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """What people have been told of one time in which nothing could be judged: it began at ``since`` (s), with
-    so many ``messages``, the last of them at ``time`` (s); ``is_over`` once a dive was judged again."""
+    """What people have been told of one time in which nothing could be judged.
+
+    It began at ``since`` (s); there were so many ``messages``, the last of them at ``time`` (s). ``is_over``
+    once a dive was judged again.
+    """
 
     id: str
     since: float
