@@ -72,8 +72,8 @@ def blind(found: Blindness, *, alert_id: str, thread: str, first: bool) -> Alert
     """No dive can be judged; not the ``first`` message of it: it still is so."""
     reasons = _reasons(found.items)
     (main, count), lasted = reasons[0], duration(found.until - found.since)
-    still = "" if first else "Still: "
-    lead = f"{still}no dive of {_name(found.glider)} could be judged for {lasted}, although its files come. "
+    lead = f"{'No' if first else 'Still no'} dive of {_name(found.glider)} could be judged for {lasted}, "
+    lead += "although it is at sea and its files come. "
     lead += "A fault of the glider would not be seen."
     last = "none yet" if found.judged is None else f"surfaced {utc(found.judged)}"
     page = Page(
