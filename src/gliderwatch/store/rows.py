@@ -40,8 +40,8 @@ class File:
     segment: str = ""
     reason: str = ""
     crc: str = ""
-    hindrance: Hindrance | None = None
     opened_at: float | None = field(default=None, compare=False)
+    hindrance: Hindrance | None = None
 
 
 @dataclass(frozen=True, slots=True)
