@@ -9,9 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gliderwatch.alerts.escalation import escalated
 from gliderwatch.alerts.unknown import CURES, Unjudged
 from gliderwatch.model import Alert, Expected, Hindrance, Kind, Severity, Unusable
 from gliderwatch.params import Attention
+from gliderwatch.rules.announce import Said, unanswered
 from gliderwatch.rules.silence import Sign
 from gliderwatch.rules.unknown import Unknown, announce, blindness
 
@@ -171,3 +173,15 @@ def test_it_is_a_function_of_what_is_known(flagged: list[bool], luck) -> None:
     assert (found is not None) == (len(flagged) - last >= 7), (
         "six times four hours, less what is at the surface"
     )
+
+
+def test_while_it_goes_on_nobody_has_taken_it_on() -> None:
+    """Who waits for an acknowledgement hears of it; there is no incident to acknowledge, but a mute."""
+    talk = Talk(Sea())
+    for k in range(7):
+        talk.hear(k, Unusable.NO_HEADING, "no heading")
+    (alert,) = talk.alerts
+    assert unanswered(Said(unknown=talk.said), (), {}) == {alert.incident}
+    assert "gliderwatch mute electa --hours 6" in escalated(alert, 1800.0).body
+    talk.hear(7)
+    assert unanswered(Said(unknown=talk.said), (), {}) == frozenset()
