@@ -273,6 +273,7 @@ class TestRefused:
         store._db.execute("UPDATE outbox SET error = 'refused: not yet' WHERE alert = 'waits'")
         store._db.executescript(
             "ALTER TABLE outbox DROP COLUMN delivery; ALTER TABLE files DROP COLUMN hindrance;"
+            "DROP INDEX files_by_segment;"
             "PRAGMA user_version = 4;"
         )
         assert [u.alert for u in store.refused(0.0)] == ["1", "2", "4"]
