@@ -87,6 +87,17 @@ class Segment:
         return self.quantities.get(name, EMPTY)
 
 
+class Hindrance(StrEnum):
+    """Why a file was not taken, for decisions."""
+
+    NO_CACHE = "no_cache"
+    UNREADABLE = "unreadable"
+    GONE = "gone"
+    RENAMED = "renamed"
+    DAMAGED = "damaged"
+    NOT_ASSESSED = "not_assessed"
+
+
 # --------------------------------------------------------------------------- navigation
 
 
@@ -122,13 +133,26 @@ class Current:
     final: bool
 
 
+class Unusable(StrEnum):
+    """Why the speed on a dive can not be estimated: for decisions. The words beside it have the numbers."""
+
+    NOT_SURFACED = "not_surfaced"
+    NO_FIX_BEFORE = "no_fix_before"
+    DATA_MISSING = "data_missing"
+    SURFACE_DRIFT = "surface_drift"
+    WILD_FIX = "wild_fix"
+    STALE_FIX = "stale_fix"
+    NO_HEADING = "no_heading"
+    TURNING = "turning"
+
+
 @dataclass(frozen=True, slots=True)
 class Dive:
     """What happened between the fix before and the fix after one dive.
 
-    ``reason`` is empty when the dive can be used for estimation; otherwise it says in words why
-    not ("no fix", "no heading", "data missing"), and ``track`` is None. ``evidence`` holds
-    numbers that speak for or against a fault (`docs/nomenclature.md`), None-free.
+    ``unusable`` is None and ``reason`` empty when the dive can be used for estimation; otherwise they say
+    why not, for decisions and in words, and ``track`` is None. ``evidence`` holds numbers that speak for or
+    against a fault (`docs/nomenclature.md`), None-free.
     """
 
     glider: str
@@ -143,6 +167,7 @@ class Dive:
     n_samples: int
     evidence: Mapping[str, float]
     notes: tuple[str, ...] = ()
+    unusable: Unusable | None = None
 
 
 # --------------------------------------------------------------------------- results
@@ -160,7 +185,8 @@ class Flag(IntEnum):
 class Assessment:
     """What gliderwatch says of one dive. Fields: `docs/nomenclature.md`.
 
-    ``reason`` says in words why there is no flag, or what a flag other than 0 means here.
+    ``reason`` says in words why there is no flag, or what a flag other than 0 means here; ``unusable`` is
+    that of the dive.
     """
 
     glider: str
@@ -187,6 +213,7 @@ class Assessment:
     evidence: Mapping[str, float]
     notes: tuple[str, ...]
     parameters: str
+    unusable: Unusable | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,6 +253,7 @@ class Kind(StrEnum):
     REMINDER = "reminder"
     CORRECTION = "correction"
     OVERDUE = "overdue"
+    UNKNOWN = "unknown"
     SURFACING = "surfacing"
     OPERATOR = "operator"
 

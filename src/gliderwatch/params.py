@@ -89,7 +89,7 @@ class GliderParams:
 
 @dataclass(frozen=True, slots=True)
 class Attention:
-    """How a glider's silence is taken, and until when it is not spoken of.
+    """When a glider's silence, or dives that cannot be judged, are spoken of, and until when nothing is.
 
     Apart from `GliderParams`: it changes nothing that is estimated, so it leaves their hash as it is.
     """
@@ -100,6 +100,10 @@ class Attention:
     """Time (s) until which nothing is told of it."""
     recovered: bool = False
     """Whether it is out of the water: nothing is told of it."""
+    unknown_hours: float | None = 24.0
+    """Hours without a dive that could be judged after which that is told; None: hours do not count."""
+    unknown_dives: int | None = 8
+    """Dives in a row that could not be judged after which that is told; None: their number does not count."""
 
     def is_quiet(self, now: float) -> bool:
         """Whether nothing is told of it at a time (s)."""

@@ -14,7 +14,7 @@ import pytest
 
 from alert_support import SLOW, alert, incident
 from gliderwatch.errors import DamagedError, GliderwatchError, StateError
-from gliderwatch.model import Alert, Expected, Segment, SegmentId, Series, readonly
+from gliderwatch.model import Alert, Expected, Segment, SegmentId, Series, Unusable, readonly
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Memory, Outcome
 from gliderwatch.rules.announce import Said
@@ -371,7 +371,7 @@ class TestLedger:
 
     def test_only_known_states(self, store):
         with pytest.raises(sqlite3.IntegrityError):
-            store._db.execute("INSERT INTO files VALUES ('/x', 1, 1, 'lost', '', '', '', '', 0)")
+            store._db.execute("INSERT INTO files VALUES ('/x', 1, 1, 'lost', '', '', '', '', 0, '')")
 
 
 class TestSegments:
@@ -453,8 +453,8 @@ class TestResults:
     def test_a_dive_that_has_not_ended_is_no_surfacing(self, store):
         known = store.known("electa")
         ended = replace(SLOW, t_dive=0.0, t_surface=50.0)
-        lost = replace(SLOW, t_dive=100.0, t_surface=150.0, reason="data missing: 1 of 2 h")
-        under_way = replace(SLOW, t_dive=200.0, t_surface=250.0, reason="no fix", flag=None)
+        lost = replace(SLOW, t_dive=100.0, t_surface=150.0, unusable=Unusable.DATA_MISSING)
+        under_way = replace(SLOW, t_dive=200.0, t_surface=250.0, unusable=Unusable.NOT_SURFACED, flag=None)
         store.apply("electa", Outcome(GliderState(), float("-inf"), (ended, lost, under_way), (), None))
         assert known.last_surfacing(1e9) == lost
         assert known.last_surfacing(149.0) == ended and known.last_surfacing(0.0) is None
@@ -494,7 +494,7 @@ class TestSurfacings:
 
     def test_the_first_surfacing_after_a_time(self, store):
         ended = [replace(SLOW, t_dive=t, t_surface=t + 50) for t in (0.0, 100.0)]
-        under_way = replace(SLOW, t_dive=200.0, t_surface=250.0, reason="no fix", flag=None)
+        under_way = replace(SLOW, t_dive=200.0, t_surface=250.0, unusable=Unusable.NOT_SURFACED, flag=None)
         store.apply("electa", Outcome(GliderState(), float("-inf"), (*ended, under_way), (), None))
         assert [store.known("electa").first_surfacing(t) for t in (0.0, 50.0, 150.0)] == [50.0, 150.0, None]
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from gliderwatch.forecast.surfacing import Surfacings, expect, learn
-from gliderwatch.model import Expected, Fix
+from gliderwatch.model import Expected, Fix, Unusable
 from gliderwatch.navigation.frame import from_plane, to_plane
 from joint_support import DAY, HOUR, LAT, LON, START, Way, dive, mission
 
@@ -188,7 +188,7 @@ def test_what_was_expected_after_another_surfacing_is_no_miss():
 def test_a_stale_fix_says_nothing_of_the_way():
     dives = mission([Way()] * 6)
     state = after(dives[:5])
-    stale = replace(dives[5], track=None, current=None, reason="stale fix")
+    stale = replace(dives[5], track=None, current=None, unusable=Unusable.STALE_FIX)
     seen = learn(state, stale, None, expect(state, SPEED, SIGMA, steady()))
     assert (seen.scores, seen.misses, seen.drift) == (state.scores, state.misses, state.drift)
     assert seen.fix == stale.end

@@ -12,7 +12,7 @@ import threading
 from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
-from gliderwatch.alerts.smtp import PARTLY, DeliveryError, envelope_of, first, is_permanent, reach, submit
+from gliderwatch.alerts.smtp import DeliveryError, envelope_of, first, is_permanent, reach, submit
 from gliderwatch.model import Alert, Kind, Severity
 
 __all__ = ["Channel", "DeliveryError", "problem", "scrub"]
@@ -103,10 +103,12 @@ class Channel:
         del self._accepted[alert.id], self._refused[alert.id]
         if refused:
             n = len(envelope.recipients)
-            partly = PARTLY if len(refused) < n else ""
+            partly = len(refused) < n
+            some = "only some took it: " if partly else ""
             raise DeliveryError(
-                f"{partly}mail server refused {len(refused)} of {n} recipients: {first(refused)}",
+                f"{some}mail server refused {len(refused)} of {n} recipients: {first(refused)}",
                 permanent=True,
+                partly=partly,
             )
 
 

@@ -19,10 +19,10 @@ from zlib import crc32
 import structlog
 
 from gliderwatch.alerts import message
-from gliderwatch.alerts.worker import OutboxRow, Result, Sender, Worker
+from gliderwatch.alerts.worker import Delivery, OutboxRow, Result, Sender, Worker
 from gliderwatch.model import Alert, Severity
 
-__all__ = ["Dispatcher", "OutboxRow", "OutboxStore", "Sender", "retry_delay"]
+__all__ = ["Delivery", "Dispatcher", "OutboxRow", "OutboxStore", "Sender", "retry_delay"]
 
 log = structlog.get_logger(__name__)
 
@@ -59,9 +59,15 @@ class OutboxStore(Protocol):
         ...
 
     def refused(
-        self, row_id: int, error: str, now: float, report: Alert | None, channels: Iterable[str]
+        self,
+        row_id: int,
+        delivery: Delivery,
+        error: str,
+        now: float,
+        report: Alert | None,
+        channels: Iterable[str],
     ) -> None:
-        """Give a row up, keep its reason, post `report` to other channels, and commit both as one."""
+        """Give a row up, keep how and why, post `report` to other channels, and commit both as one."""
         ...
 
     def park(self, row_id: int, error: str) -> None:
@@ -194,13 +200,13 @@ class Dispatcher:
 
     def _note(self, store: OutboxStore, result: Result) -> None:
         row, worker = result.row, result.worker
-        if result.error is None:
+        if result.delivery is Delivery.DELIVERED:
             store.delivered(row.id, self._clock())
             self._waiting.pop(row.id, None)
             seconds = round(result.seconds, 3)
             log.info("alert delivered", **_about(row), seconds=seconds)
-        elif result.refused:
-            self._refused(store, row, result.error)
+        elif result.delivery is not Delivery.PENDING:
+            self._refused(store, row, result.delivery, result.error)
         elif worker.row is not None:  # else its row was given up before, and counted
             self._failed(store, row, result.error)
         worker.row = None
@@ -217,11 +223,11 @@ class Dispatcher:
                 worker.end()
                 self._workers[name] = Worker(name, worker.channel, self._report)
 
-    def _refused(self, store: OutboxStore, row: OutboxRow, error: str) -> None:
+    def _refused(self, store: OutboxStore, row: OutboxRow, delivery: Delivery, error: str) -> None:
         now, others = self._clock(), [name for name in self._channels if name != row.channel]
         is_report = row.alert.id.startswith(_REPORT)  # of which no report is made: it would go round
         report = None if is_report or not others else _report_of(row, error, now)
-        store.refused(row.id, error, now, report, others)
+        store.refused(row.id, delivery, error, now, report, others)
         self._waiting.pop(row.id, None)
         log.error("alert refused for good", **_about(row), error=error)
         if report is not None:

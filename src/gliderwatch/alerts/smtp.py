@@ -14,19 +14,17 @@ from gliderwatch.alerts.mail import Envelope, compose
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.model import Alert
 
-PARTLY = "only some took it: "
-"""How the text of a refusal begins where other addresses of the channel took the message."""
-
 
 class DeliveryError(GliderwatchError):
     """A message was not surely delivered. The text holds no secret of the channel's URL.
 
-    ``permanent``: the same message would be refused again, however often it is tried.
+    ``permanent``: the same message would be refused again, however often it is tried; ``partly``: other
+    addresses of the channel took it.
     """
 
-    def __init__(self, text: str, *, permanent: bool = False) -> None:
+    def __init__(self, text: str, *, permanent: bool = False, partly: bool = False) -> None:
         super().__init__(text)
-        self.permanent = permanent
+        self.permanent, self.partly = permanent, partly
 
 
 def envelope_of(service: Any) -> Envelope:

@@ -20,10 +20,11 @@ from gliderwatch.config.fields import (
     Switch,
 )
 from gliderwatch.config.section import Section
-from gliderwatch.params import AnomalyRule, FalseAlarmRule, GliderParams, LearnerParams, RuleParams
+from gliderwatch.params import AnomalyRule, Attention, FalseAlarmRule, GliderParams, LearnerParams, RuleParams
 
 _G = GliderParams()
 _E, _R = _G.learner, _G.rules
+_A = Attention()
 
 
 class NormalSpeed(Section):
@@ -163,6 +164,17 @@ class Settings(Preset):
         default=None,
         description="Hours past the expected surfacing after which a silent glider is overdue; null: 40 min "
         "and the longest of 3 h, one interval between surfacings, 3 standard errors of the expected time.",
+    )
+
+    unknown_hours: Annotated[Number, Field(gt=0, le=720)] | None = Field(
+        default=_A.unknown_hours,
+        description="Hours without a dive that could be judged, although files come, after which that is "
+        "told (at least two intervals between surfacings); null: hours do not count.",
+    )
+    unknown_dives: Count | None = Field(
+        default=_A.unknown_dives,
+        description="Dives in a row that could not be judged after which that is told; null: their number "
+        "does not count.",
     )
 
     preset: str | None = Field(default=None, description="Name of a preset; keys given here win over it.")

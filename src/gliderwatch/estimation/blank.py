@@ -41,4 +41,5 @@ def blank(dive: Dive, params: GliderParams, digest: str, reason: str) -> Assessm
         evidence=numbers,
         notes=dive.notes,
         parameters=digest,
+        unusable=dive.unusable,
     )

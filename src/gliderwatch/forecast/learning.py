@@ -11,7 +11,7 @@ from gliderwatch.estimation.observation import are_apart
 from gliderwatch.forecast import timing
 from gliderwatch.forecast.state import CHI2, Place, Surfacings, bearing, factor, is_same, plan
 from gliderwatch.forecast.steering import courses
-from gliderwatch.model import Array, Dive, Expected, Fix
+from gliderwatch.model import Array, Dive, Expected, Fix, Unusable
 from gliderwatch.navigation.frame import way
 
 FEW, MANY, HELD = 5, 30, 16
@@ -57,11 +57,11 @@ def learn(
 
 def is_unseen(dive: Dive) -> bool:
     """Whether data are missing before the end of a dive, so that the glider may have been up unnoticed."""
-    return dive.evidence.get("unobserved_h", 0.0) > UNSEEN or dive.reason.startswith("data missing")
+    return dive.evidence.get("unobserved_h", 0.0) > UNSEEN or dive.unusable is Unusable.DATA_MISSING
 
 
 def _is_stale(dive: Dive) -> bool:
-    return dive.reason.startswith("stale")
+    return dive.unusable is Unusable.STALE_FIX
 
 
 def ground(dive: Dive) -> Array | None:

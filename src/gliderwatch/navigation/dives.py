@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
-from gliderwatch.model import Dive, Fix, Segment
+from gliderwatch.model import Dive, Fix, Segment, Unusable
 from gliderwatch.navigation.current import Known, Report, new_reports, pair, updated
 from gliderwatch.navigation.fixes import FASTEST, SUSPECT, distance, new_fixes, stays
 from gliderwatch.navigation.flight import SPARSE, Flight, find_flight, lengthened, unseen
@@ -132,7 +132,14 @@ def _withdraw_old_fix(state: Navigation, fixes: list[Fix]) -> tuple[Navigation, 
     if fixes and state.fix is not None and state.dive.end == state.fix:
         gap = fixes[0].t - state.fix.t
         if gap < SHORTEST and distance(state.fix, fixes[0]) > FASTEST * gap + 100.0:
-            withdrawn = replace(state.dive, end=fixes[0], track=None, current=None, reason="stale fix")
+            withdrawn = replace(
+                state.dive,
+                end=fixes[0],
+                track=None,
+                current=None,
+                reason="stale fix",
+                unusable=Unusable.STALE_FIX,
+            )
             return replace(state, fix=fixes[0]), [withdrawn]
     return state, [state.dive]
 
@@ -160,8 +167,8 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
     if end is not None:
         flight = lengthened(flight, samples, end.t, state.holes)
     missing = sum(min(b, end.t) - a for a, b in state.holes if a < end.t) if end is not None else 0.0
-    reason = why_unusable(samples, flight, start, end, missing)
-    if start is None or end is None or reason:
+    unusable, reason = why_unusable(samples, flight, start, end, missing)
+    if start is None or end is None or unusable is not None:
         track = None
         numbers = {"duration_h": flight.duration / 3600} | attitude(samples, flight)
     else:
@@ -183,6 +190,7 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
         n_samples=len(get(samples, "heading_e").between(flight.start, flight.end)),
         evidence=MappingProxyType(numbers),
         notes=state.notes + flight_notes(flight, numbers),
+        unusable=unusable,
     )
 
 
@@ -201,6 +209,6 @@ def _with_currents(
         i = ends[k][1] if 0 <= k < len(ends) else None
         if k == len(ends):
             waiting.append(report)
-        elif i is not None and not out[i].reason.startswith("stale"):
+        elif i is not None and out[i].unusable is not Unusable.STALE_FIX:
             out[i] = replace(out[i], current=updated(out[i].current, report, out[i].t_surface))
     return out, waiting

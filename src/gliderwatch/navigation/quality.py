@@ -6,14 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gliderwatch.model import Fix, Segment
+from gliderwatch.model import Fix, Segment, Unusable
 from gliderwatch.navigation.fixes import FASTEST, distance
 from gliderwatch.navigation.flight import SPARSE, Flight
 from gliderwatch.navigation.samples import Samples, get
 from gliderwatch.navigation.track import CIRCLING
 
-NOT_SURFACED = "no fix"
-"""The reason of a dive that has not ended, as far as known."""
 UNOBSERVED = 0.25
 """Share of the interval between two fixes that may be missing before a dive cannot be used."""
 BLIND = 0.8
@@ -25,33 +23,37 @@ SURFACE = 0.5
 """Share of the interval between two fixes that the glider may have drifted before it cannot be used."""
 
 
-def why_unusable(samples: Samples, flight: Flight, start: Fix | None, end: Fix | None, missing: float) -> str:
-    """Why the speed on a dive cannot be estimated; empty when it can.
+def why_unusable(
+    samples: Samples, flight: Flight, start: Fix | None, end: Fix | None, missing: float
+) -> tuple[Unusable | None, str]:
+    """Why the speed on a dive cannot be estimated, and the same in words; None and empty when it can.
 
     `missing`: seconds between the fixes of which no segment has come.
     """
     if end is None:
-        return NOT_SURFACED
+        return Unusable.NOT_SURFACED, "no fix"
     if start is None:
-        return "no fix before the dive"
+        return Unusable.NO_FIX_BEFORE, "no fix before the dive"
     interval = end.t - start.t
     if flight.evidence == "missing" or missing > UNOBSERVED * interval:
-        return f"data missing: {missing / 3600:.1f} of {interval / 3600:.1f} h between two fixes"
+        words = f"data missing: {missing / 3600:.1f} of {interval / 3600:.1f} h between two fixes"
+        return Unusable.DATA_MISSING, words
     if interval - flight.duration > SURFACE * interval:
-        return "mostly surface drift"
+        return Unusable.SURFACE_DRIFT, "mostly surface drift"
     over_ground = distance(start, end) / interval
-    return (
-        f"wild fix: {over_ground:.0f} m/s over ground" if over_ground > FASTEST else _blind(samples, flight)
-    )
+    if over_ground > FASTEST:
+        return Unusable.WILD_FIX, f"wild fix: {over_ground:.0f} m/s over ground"
+    return _blind(samples, flight)
 
 
-def _blind(samples: Samples, flight: Flight) -> str:
-    """Why the headings of a flight do not do; empty when they do."""
+def _blind(samples: Samples, flight: Flight) -> tuple[Unusable | None, str]:
+    """Why the headings of a flight do not do, and the same in words; None and empty when they do."""
     gap = heading_gap(samples, flight)
     if gap > BLIND * flight.duration:
-        return f"no heading for {gap / 3600:.1f} h"
-    turning = gap > 2 * SPARSE and _heading_length(samples, flight) < STEADY
-    return f"turning, and no heading for {gap / 3600:.1f} h" if turning else ""
+        return Unusable.NO_HEADING, f"no heading for {gap / 3600:.1f} h"
+    if gap > 2 * SPARSE and _heading_length(samples, flight) < STEADY:
+        return Unusable.TURNING, f"turning, and no heading for {gap / 3600:.1f} h"
+    return None, ""
 
 
 def heading_gap(samples: Samples, flight: Flight) -> float:

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
 from gliderwatch.currents.field import Field
-from gliderwatch.errors import GliderwatchError, Quarantine
+from gliderwatch.errors import GliderwatchError, NotAssessed
 from gliderwatch.model import Alert, Assessment, Segment, SegmentId
 from gliderwatch.params import Attention, GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
-from gliderwatch.rules import overdue, silence
+from gliderwatch.rules import overdue, silence, unknown
 from gliderwatch.rules.announce import due
 from gliderwatch.store.sqlite import File, Status, Store
 
@@ -149,7 +149,7 @@ def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: 
         return process(state, segment, params, ocean)
     except Exception as error:
         what = f"{type(error).__name__}: {error}"
-        raise Quarantine(f"cannot be assessed, please report it ({segment.id.name}: {what})") from error
+        raise NotAssessed(f"cannot be assessed, please report it ({segment.id.name}: {what})") from error
 
 
 def _speak(
@@ -157,7 +157,8 @@ def _speak(
 ) -> tuple[Alert, ...]:
     if speaking is None:
         return ()
-    if store.notes.heeded(glider, speaking.attention(glider)).is_quiet(now):
+    attention = store.notes.heeded(glider, speaking.attention(glider))
+    if attention.is_quiet(now):
         store.answer(glider, now, quiet=True)
         return ()
     before, known = store.said(glider), store.known(glider)
@@ -169,7 +170,8 @@ def _speak(
         speaking.notices(glider),
         store.notes.acks(glider),
     )
-    alerts = [*heard, *alerts]
+    blind, more = unknown.announce(said.unknown, known, attention, params.rules.reminder_hours, now)
+    said, alerts = replace(said, unknown=blind), [*heard, *alerts, *more]
     if said != before or alerts:
         store.say(glider, said, alerts, speaking.channels, now)
     return tuple(alerts)

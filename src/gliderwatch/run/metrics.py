@@ -16,6 +16,7 @@ import structlog
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info, start_http_server
 
 from gliderwatch import __version__
+from gliderwatch.alerts.outbox import Delivery
 from gliderwatch.config import Config
 from gliderwatch.config.service import Metrics as Settings
 from gliderwatch.model import Assessment
@@ -23,7 +24,7 @@ from gliderwatch.rules.overdue import RECENT
 from gliderwatch.rules.silence import GONE, awaited
 from gliderwatch.run.life import STALE
 from gliderwatch.run.operator import last_files, reading
-from gliderwatch.store.outbox import released
+from gliderwatch.store.outbox import delivery, released
 from gliderwatch.store.sqlite import File, Status, Store
 
 log = structlog.get_logger(__name__)
@@ -175,7 +176,7 @@ class Outbox:
         waiting: dict[str, int] = {}
         rows = self._rows()
         for row in rows:
-            number, channel, attempts, delivered_at, due, error = row
+            number, channel, attempts, delivered_at, due, how = row
             if more := attempts - self._attempts.get(number, 0):
                 failed.append((channel, more))
                 self._attempts[number] = attempts
@@ -183,7 +184,7 @@ class Outbox:
                 waiting[channel] = waiting.get(channel, 0) + (due <= now)
             elif number not in self._delivered:
                 self._delivered.add(number)
-                if not error:
+                if how == Delivery.DELIVERED:
                     delays.append((channel, max(0.0, delivered_at - due)))
         self._move_on([row[0] for row in rows if row[3] is None], rows)
         return delays, failed, waiting
@@ -192,7 +193,7 @@ class Outbox:
         with reading(self._state) as db:
             sql = (
                 "SELECT o.id, o.channel, o.attempts, o.delivered_at, "
-                f"max(a.made_at, {released(db)}), o.error "
+                f"max(a.made_at, {released(db)}), {delivery(db)} "
                 "FROM outbox o JOIN alerts a ON a.id = o.alert WHERE o.id > ? ORDER BY o.id"
             )
             return list(db.execute(sql, (self._from,)))

@@ -13,18 +13,19 @@ from pathlib import Path
 from typing import Any
 
 from gliderwatch.alerts import message
-from gliderwatch.alerts.smtp import PARTLY
 from gliderwatch.alerts.words import duration, utc
 from gliderwatch.config import Config
 from gliderwatch.config.service import Operator as Settings
 from gliderwatch.model import Alert, Severity
+from gliderwatch.rules.overdue import outlook
+from gliderwatch.rules.silence import GONE
 from gliderwatch.run.speaking import Waits, waits
 from gliderwatch.store.database import guarded, read_only
-from gliderwatch.store.outbox import REFUSED, released
+from gliderwatch.store.outbox import delivery, released
 from gliderwatch.store.sqlite import Store
 
 DAY, HOUR = 86400.0, 3600.0
-SILENCE, QUARANTINE, DISK, CHANNEL = "silence", "quarantine", "disk", "channel"
+SILENCE, QUARANTINE, WAITING, DISK, CHANNEL = "silence", "quarantine", "waiting", "disk", "channel"
 _ROOT, _OVER = "operator/", "/over"
 
 
@@ -38,15 +39,28 @@ class Failing:
 
 
 @dataclass(frozen=True, slots=True)
+class Waiting:
+    """Files of a glider that wait: how many, the oldest ``since`` (s) and why that one does."""
+
+    files: int
+    since: float
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class Vitals:
     """How the watch itself is.
 
-    ``silent`` for so long no file came (s; None: no glider is at sea), ``quarantined`` files in the last
-    24 h, ``failing`` channels by name, ``free`` space for the state (MB; None: not known).
+    ``silent`` for so long no file came (s; None: no glider is at sea), and of each glider that is ``missed``
+    while others call. By glider ("" where the header does not say): files ``quarantined`` in the last 24 h,
+    and files that are ``waiting``. ``failing`` channels by name, ``free`` space for the state (MB; None: not
+    known).
     """
 
     silent: float | None = None
-    quarantined: int = 0
+    missed: Mapping[str, float] = field(default_factory=dict)
+    quarantined: Mapping[str, int] = field(default_factory=dict)
+    waiting: Mapping[str, Waiting] = field(default_factory=dict)
     failing: Mapping[str, Failing] = field(default_factory=dict)
     free: float | None = None
 
@@ -62,20 +76,9 @@ class Trouble:
 def troubles(vitals: Vitals, limits: Settings, open_: Iterable[str], now: float) -> dict[str, Trouble]:
     """What is wrong at `now` (s), by key. What is `open_` ends only well within its limit, so that it does
     not come and go."""
-    found, going_on = {}, set(open_)
-    hours, quarantined, free = limits.silent_hours, limits.quarantined_per_day, limits.free_mb
-    if hours is not None and vitals.silent is not None and vitals.silent > hours * HOUR:
-        found[SILENCE] = Trouble(
-            f"no file of any glider for {duration(vitals.silent)}",
-            f"The last one came {utc(now - vitals.silent)}. Check the dockserver, its modems and telephone "
-            "lines, and the share that its folders are on.\nUntil then no glider is watched.",
-        )
-    if quarantined is not None and vitals.quarantined > quarantined / (2 if QUARANTINE in going_on else 1):
-        found[QUARANTINE] = Trouble(
-            f"{vitals.quarantined} files quarantined in 24 h",
-            "They cannot be used as they are. `gliderwatch status` names them with the reason. Many at "
-            "once mean a damaged disk, a transfer that cuts files, or a folder that is no glider's.",
-        )
+    going_on = set(open_)
+    found = _silences(vitals, limits, now) | _files(vitals, limits, going_on, now)
+    free = limits.free_mb
     if free is not None and vitals.free is not None and vitals.free < free * (1.2 if DISK in going_on else 1):
         found[DISK] = Trouble(
             f"only {vitals.free:.0f} MB free for the state file",
@@ -93,12 +96,62 @@ def troubles(vitals: Vitals, limits: Settings, open_: Iterable[str], now: float)
     return found
 
 
+def _silences(vitals: Vitals, limits: Settings, now: float) -> dict[str, Trouble]:
+    """That no file comes, of any glider or of one."""
+    hours = limits.silent_hours
+    if hours is None or vitals.silent is None:
+        return {}
+    if vitals.silent > hours * HOUR:
+        title = f"no file of any glider for {duration(vitals.silent)}"
+        text = (
+            f"The last one came {utc(now - vitals.silent)}. Check the dockserver, its modems and telephone "
+        )
+        text += "lines, and the share that its folders are on.\nUntil then no glider is watched."
+        return {SILENCE: Trouble(title, text)}
+    return {
+        f"{SILENCE}/{glider}": Trouble(
+            f"no file of {glider} for {duration(silent)}",
+            f"The last one came {utc(now - silent)}; other gliders call. Check its folder on the dockserver. "
+            "If it is out of the water, say so: `recovered: true`, or `gliderwatch mute`.",
+        )
+        for glider, silent in vitals.missed.items()
+        if silent > hours * HOUR
+    }
+
+
+def _files(vitals: Vitals, limits: Settings, going_on: set[str], now: float) -> dict[str, Trouble]:
+    """That files of a glider come and are not taken."""
+    found, most, hours = {}, limits.quarantined_per_day, limits.waiting_hours
+    for glider, count in vitals.quarantined.items():
+        key = _key(QUARANTINE, glider)
+        if most is not None and count > most / (2 if key in going_on else 1):
+            found[key] = Trouble(
+                f"{count} files of {glider or 'no known glider'} quarantined in 24 h",
+                "They cannot be used as they are. `gliderwatch status` names them with the reason. Many at "
+                "once mean a damaged disk, a transfer that cuts files, or a folder that is no glider's.",
+            )
+    for glider, waiting in vitals.waiting.items():
+        late = now - waiting.since
+        if hours is not None and late > hours * HOUR:
+            found[_key(WAITING, glider)] = Trouble(
+                f"files of {glider or 'no known glider'} have waited for {duration(late)}",
+                f"{waiting.files} wait; the oldest since {utc(waiting.since)}: {waiting.reason}.\nThey are "
+                "taken once that is mended. `gliderwatch status` names them all.",
+            )
+    return found
+
+
+def _key(kind: str, glider: str) -> str:
+    return f"{kind}/{glider}" if glider else kind
+
+
 def over(key: str) -> str:
     """That a trouble is over, in words."""
     kind, _, name = key.partition("/")
     return {
-        SILENCE: "files come again",
-        QUARANTINE: "hardly any files are quarantined any more",
+        SILENCE: f"files of {name} come again" if name else "files come again",
+        QUARANTINE: f"hardly any files{f' of {name}' if name else ''} are quarantined any more",
+        WAITING: f"no files{f' of {name}' if name else ''} wait any more",
         DISK: "there is room on the disk again",
         CHANNEL: f"channel {name} does not fail any more",
     }[kind]
@@ -128,24 +181,37 @@ def failing(state: Path, now: float) -> dict[str, Failing]:
     `now` (s) and have delivered none since. What is held does not wait before it is due, and a message that
     some of a channel's addresses took has been told: the report of the refusal names the others."""
     with reading(state) as db:
-        since = f"max(a.made_at, {released(db)})"
+        since, how = f"max(a.made_at, {released(db)})", delivery(db)
         sql = (
             "SELECT channel, min(since), count(*), error FROM ("
             f"SELECT o.channel, {since} AS since, o.error FROM outbox o JOIN alerts a ON a.id = o.alert "
             "WHERE o.delivered_at IS NULL AND o.attempts > 0 UNION ALL "
             f"SELECT o.channel, {since} AS since, o.error FROM outbox o JOIN alerts a ON a.id = o.alert "
-            "WHERE o.delivered_at > ?1 AND o.error LIKE ?2 || '%' AND o.error NOT LIKE ?2 || ?3 || '%' "
+            f"WHERE o.delivered_at > ? AND {how} = 'refused' "
             "AND NOT EXISTS (SELECT 1 FROM outbox l WHERE l.delivered_at > o.delivered_at "
-            "AND l.channel = o.channel AND l.error = '')) GROUP BY channel"
+            f"AND l.channel = o.channel AND {how} = 'delivered')) GROUP BY channel"
         )
-        return {row[0]: Failing(*row[1:]) for row in db.execute(sql, (now - DAY, REFUSED, PARTLY))}
+        return {row[0]: Failing(*row[1:]) for row in db.execute(sql, (now - DAY,))}
 
 
-def quarantined(state: Path, since: float) -> int:
-    """How many files were quarantined since a time (s)."""
-    sql = "SELECT count(*) FROM files WHERE status = 'quarantined' AND noted_at > ?"
+def quarantined(state: Path, since: float) -> dict[str, int]:
+    """How many files of each glider were quarantined since a time (s)."""
+    sql = (
+        "SELECT glider, count(*) FROM files WHERE status = 'quarantined' AND noted_at > ? "
+        "GROUP BY glider ORDER BY glider"
+    )
     with reading(state) as db:
-        return int(db.execute(sql, (since,)).fetchone()[0])
+        return {row[0]: row[1] for row in db.execute(sql, (since,))}
+
+
+def waiting(state: Path) -> dict[str, Waiting]:
+    """The files of each glider that wait; what has gone is not waited for."""
+    sql = (  # of a query with min() SQLite takes the other columns from the row of the minimum
+        "SELECT glider, count(*), min(noted_at), reason FROM files "
+        "WHERE status = 'waiting' AND hindrance != 'gone' GROUP BY glider ORDER BY glider"
+    )
+    with reading(state) as db:
+        return {row[0]: Waiting(*row[1:]) for row in db.execute(sql)}
 
 
 def last_files(state: Path, gliders: Iterable[str]) -> dict[str, float]:
@@ -174,23 +240,40 @@ class Operator:
     def __init__(self, store: Store, state: Path, config: Config, now: float, monotonic: float) -> None:
         self._store, self._state = store, state
         self._open = told(state)
-        last = max(last_files(state, config.gliders).values(), default=now)
-        self._heard = monotonic - max(0.0, now - last)
+        last = last_files(state, config.gliders)
+        self._heard = {glider: monotonic - max(0.0, now - at) for glider, at in last.items()}
+        self._any = max(self._heard.values(), default=monotonic)
 
-    def came(self, monotonic: float) -> None:
-        """A file came."""
-        self._heard = monotonic
+    def came(self, glider: str, monotonic: float) -> None:
+        """A file of a glider came; of none ("") where its header does not say."""
+        self._heard[glider] = self._any = monotonic
 
     def vitals(self, config: Config, now: float, monotonic: float) -> Vitals:
         """How the watch is now."""
-        at_sea = any(not glider.recovered for glider in config.gliders.values())
-        waiting = {name: f for name, f in failing(self._state, now).items() if name in config.channels}
+        watched = {name for name, glider in config.gliders.items() if not glider.recovered}
+        late = {name: f for name, f in failing(self._state, now).items() if name in config.channels}
+        held = {name: w for name, w in waiting(self._state).items() if not name or name in watched}
         return Vitals(
-            monotonic - self._heard if at_sea else None,
+            monotonic - self._any if watched else None,
+            self._missed(config, watched, now, monotonic),
             quarantined(self._state, now - DAY),
-            waiting,
+            held,
+            late,
             _free(self._state.parent),
         )
+
+    def _missed(self, config: Config, watched: set[str], now: float, monotonic: float) -> dict[str, float]:
+        """For how long (s) no file came of gliders in the water, where that is no usual pause."""
+        missed = {}
+        for name in sorted(watched & self._heard.keys()):
+            silent = monotonic - self._heard[name]
+            if silent < (config.operator.silent_hours or 0.0) * HOUR or silent > GONE:
+                continue  # the look into the state is for the few that are silent
+            attention = self._store.notes.heeded(name, config.attention(name))
+            found = None if attention.is_quiet(now) else outlook(self._store.known(name), now)
+            if found is not None and silent > 2 * (found[0].t - found[0].after):
+                missed[name] = silent
+        return missed
 
     def look(self, config: Config, limits: Settings, now: float, monotonic: float) -> tuple[Alert, ...]:
         """Messages about what went wrong, and about what is well again; they are in the outbox then."""

@@ -12,7 +12,12 @@ from gliderwatch.errors import DamagedError, StateError
 
 __all__ = ["MEMORY", "SCHEMA", "StateError", "connect", "guarded", "read_only", "schema"]
 
-SCHEMA = 4
+SCHEMA = 5
+DELIVERY_BY_WORDS = """CASE
+    WHEN delivered_at IS NULL THEN 'pending' WHEN error = '' THEN 'delivered'
+    WHEN error LIKE 'withdrawn: %' THEN 'withdrawn' WHEN error LIKE 'given up: %' THEN 'unreadable'
+    WHEN error LIKE 'refused: only some took it: %' THEN 'partly_refused' ELSE 'refused' END"""
+"""SQL: how it stands with a row of the outbox of schema 4 or before, which said it in words alone."""
 MIGRATIONS: dict[int, str] = {
     2: """
 CREATE TABLE expected (           -- the next surfacing, as expected after each segment
@@ -53,6 +58,18 @@ CREATE INDEX acks_by_glider ON acks (glider);
 ALTER TABLE outbox ADD COLUMN held_until REAL NOT NULL DEFAULT 0;     -- not sent before; infinite: never
 ALTER TABLE outbox ADD COLUMN escalates REAL NOT NULL DEFAULT 9e999;  -- while nobody acknowledges, sent then
 CREATE INDEX outbox_by_delivery ON outbox (delivered_at);
+""",
+    5: f"""
+ALTER TABLE outbox ADD COLUMN delivery TEXT NOT NULL DEFAULT 'pending';  -- `alerts.worker.Delivery`
+UPDATE outbox SET delivery = {DELIVERY_BY_WORDS};
+ALTER TABLE files ADD COLUMN hindrance TEXT NOT NULL DEFAULT '';  -- why it is not taken: `model.Hindrance`
+UPDATE files SET hindrance = CASE WHEN status = 'duplicate' AND reason = 'was renamed' THEN 'renamed'
+    WHEN status = 'waiting' AND crc != '' THEN 'no_cache'
+    WHEN status = 'waiting' AND reason LIKE 'is not there any more%' THEN 'gone'
+    WHEN status = 'waiting' THEN 'unreadable'
+    WHEN status = 'quarantined' AND reason LIKE 'cannot be assessed%' THEN 'not_assessed'
+    WHEN status = 'quarantined' THEN 'damaged' ELSE '' END;
+CREATE INDEX files_by_segment ON files (glider, segment);
 """,
 }
 """SQL that leads from the schema before to the one of the key. A state file is never written by an older

@@ -1,8 +1,8 @@
 """The outbox table as the dispatcher sees it.
 
-A row is done with once ``delivered_at`` is set. Where ``error`` is not empty then, it was not delivered but
+A row is done with once ``delivered_at`` is set. ``delivery`` says how (`alerts.worker.Delivery`): delivered,
 given up (the channel refused it for good, or it cannot be read any more) or withdrawn, because somebody had
-acknowledged its incident before it was due.
+acknowledged its incident before it was due. ``error`` says why in words, for people.
 
 A row is held until ``held_until``, or until ``escalates`` while nobody has acknowledged its incident,
 whichever is first (`rules.waiting`); infinite is never. Within an incident and channel no row is held longer
@@ -17,13 +17,13 @@ from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
 from gliderwatch.alerts.escalation import escalated
-from gliderwatch.alerts.outbox import LONGEST_DELAY, OutboxRow
+from gliderwatch.alerts.outbox import LONGEST_DELAY, Delivery, OutboxRow
 from gliderwatch.errors import DamagedError
 from gliderwatch.model import Alert
 from gliderwatch.rules import waiting
 from gliderwatch.rules.waiting import AT_ONCE, NO_INCIDENT, Standing
 from gliderwatch.store import codec
-from gliderwatch.store.database import connect
+from gliderwatch.store.database import DELIVERY_BY_WORDS, connect
 from gliderwatch.store.rows import Undelivered
 
 PARKED = math.inf
@@ -35,8 +35,6 @@ FAR = 1e300
 SET_BACK = 60.0
 """Seconds: a clock that is that far before the time when a message was made was set back since. By such a
 clock nothing is held."""
-REFUSED, WITHDRAWN = "refused: ", "withdrawn: "
-"""How the ``error`` of rows begins that a channel refused for good, and of those that were withdrawn."""
 HELD = f"(o.held_until > :now AND o.escalates > :now AND :now >= a.made_at - {SET_BACK})"
 """SQL: whether a row of the outbox ``o`` and its message ``a`` is held at a time `now`."""
 
@@ -80,7 +78,7 @@ def post(
 
 def _standing(db: sqlite3.Connection, incident: str, channel: str, now: float, unanswered: bool) -> Standing:
     told, escalates = db.execute(
-        f"SELECT coalesce(max(iif(o.delivered_at IS NULL, NOT {HELD}, o.error = '')), 0), "
+        f"SELECT coalesce(max(iif(o.delivered_at IS NULL, NOT {HELD}, o.delivery = 'delivered')), 0), "
         "coalesce(min(iif(o.delivered_at IS NULL, o.escalates, NULL)), 9e999) "
         "FROM outbox o JOIN alerts a ON a.id = o.alert WHERE o.channel = :channel AND o.incident = :incident",
         {"now": now, "channel": channel, "incident": incident},
@@ -100,8 +98,8 @@ def withdraw(db: sqlite3.Connection, glider: str, unanswered: Collection[str], n
     ).fetchall()
     ids = [row[0] for row in rows if row[1] not in unanswered]
     db.executemany(
-        "UPDATE outbox SET delivered_at = ?, error = ? WHERE id = ? AND held_until = 9e999",
-        [(now, f"{WITHDRAWN}acknowledged, muted or over", n) for n in ids],
+        "UPDATE outbox SET delivered_at = ?, delivery = ?, error = ? WHERE id = ? AND held_until = 9e999",
+        [(now, Delivery.WITHDRAWN, "withdrawn: acknowledged, muted or over", n) for n in ids],
     )
     db.executemany("UPDATE outbox SET escalates = 9e999 WHERE id = ?", [(n,) for n in ids])
 
@@ -111,6 +109,12 @@ def released(db: sqlite3.Connection) -> str:
     migrated yet."""
     known = "SELECT 1 FROM pragma_table_info('outbox') WHERE name = 'escalates'"
     return "min(o.held_until, o.escalates)" if db.execute(known).fetchone() is not None else "0.0"
+
+
+def delivery(db: sqlite3.Connection) -> str:
+    """SQL: how it stands with a row of the innermost outbox, also in a file that is not migrated yet."""
+    known = "SELECT 1 FROM pragma_table_info('outbox') WHERE name = 'delivery'"
+    return "delivery" if db.execute(known).fetchone() is not None else DELIVERY_BY_WORDS
 
 
 def undelivered(db: sqlite3.Connection) -> list[Undelivered]:
@@ -127,9 +131,9 @@ def undelivered(db: sqlite3.Connection) -> list[Undelivered]:
 def refused(db: sqlite3.Connection, since: float) -> list[Undelivered]:
     """What a channel refused for good, or could not be read, since a time (s); oldest first."""
     rows = db.execute(
-        "SELECT alert, channel, attempts, error FROM outbox WHERE delivered_at >= ? AND error != '' "
-        "AND error NOT LIKE ? || '%' ORDER BY id",
-        (since, WITHDRAWN),
+        "SELECT o.alert, o.channel, o.attempts, o.error FROM outbox o WHERE o.delivered_at >= ? "
+        f"AND {delivery(db)} NOT IN ('delivered', 'withdrawn') ORDER BY o.id",
+        (since,),
     )
     return [Undelivered(*row) for row in rows]
 
@@ -161,7 +165,7 @@ class Outbox:
             try:
                 alert = codec.plain_decode(row[1], Alert)
             except DamagedError as error:
-                self._give_up(row[0], f"given up: {error}", now)
+                self._give_up(row[0], Delivery.UNREADABLE, f"given up: {error}", now)
                 continue
             found.append(OutboxRow(row[0], escalated(alert, row[5]) if row[4] else alert, row[2], row[3]))
         return found
@@ -169,9 +173,9 @@ class Outbox:
     def delivered(self, row_id: int, now: float) -> None:
         """Mark a row as delivered, also one that was withdrawn while it was on its way."""
         self._db.execute(
-            "UPDATE outbox SET delivered_at = ?, error = '' "
-            "WHERE id = ? AND (delivered_at IS NULL OR error LIKE ? || '%')",
-            (now, row_id, WITHDRAWN),
+            "UPDATE outbox SET delivered_at = ?, delivery = ?, error = '' "
+            "WHERE id = ? AND (delivered_at IS NULL OR delivery = ?)",
+            (now, Delivery.DELIVERED, row_id, Delivery.WITHDRAWN),
         )
 
     def failed(self, row_id: int, error: str, next_try: float) -> None:
@@ -183,12 +187,18 @@ class Outbox:
         )
 
     def refused(
-        self, row_id: int, error: str, now: float, report: Alert | None, channels: Iterable[str]
+        self,
+        row_id: int,
+        delivery: Delivery,
+        error: str,
+        now: float,
+        report: Alert | None,
+        channels: Iterable[str],
     ) -> None:
         """Give a row up, and put a report of it into the outbox of other channels, both or none."""
         self._db.execute("BEGIN IMMEDIATE")
         try:
-            self._give_up(row_id, f"{REFUSED}{error}", now)
+            self._give_up(row_id, delivery, f"refused: {error}", now)
             if report is not None:
                 post(self._db, report, channels, now)
             self._db.execute("COMMIT")
@@ -215,9 +225,9 @@ class Outbox:
         """Give the connection back."""
         self._db.close()
 
-    def _give_up(self, row_id: int, reason: str, now: float) -> None:
+    def _give_up(self, row_id: int, delivery: Delivery, reason: str, now: float) -> None:
         self._db.execute(
-            "UPDATE outbox SET attempts = attempts + 1, delivered_at = ?, error = ? "
+            "UPDATE outbox SET attempts = attempts + 1, delivered_at = ?, delivery = ?, error = ? "
             "WHERE id = ? AND delivered_at IS NULL",
-            (now, reason, row_id),
+            (now, delivery, reason, row_id),
         )

@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
-from gliderwatch.model import Alert, Assessment, Expected, Incident, SegmentId
-from gliderwatch.navigation.quality import NOT_SURFACED
+from gliderwatch.model import Alert, Assessment, Expected, Incident, SegmentId, Unusable
 from gliderwatch.pipeline import Outcome
 from gliderwatch.rules.announce import Said, unanswered
 from gliderwatch.store import codec, outbox, retention
@@ -108,9 +107,9 @@ class Store:
 
     def note(self, file: File, now: float) -> None:
         """Write what became of a file."""
-        f = file
-        row = (f.path, f.size, f.mtime_ns, f.status, f.glider, f.segment, f.reason, f.crc, now)
-        self._db.execute("INSERT OR REPLACE INTO files VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
+        f, why = file, file.hindrance or ""
+        row = (f.path, f.size, f.mtime_ns, f.status, f.glider, f.segment, f.reason, f.crc, now, why)
+        self._db.execute("INSERT OR REPLACE INTO files VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
 
     # --------------------------------------------------------------- retention
 
@@ -131,7 +130,7 @@ class Store:
         self._db.executemany(
             "INSERT OR REPLACE INTO assessments VALUES (?, ?, ?, ?, ?, ?)",
             [
-                (glider, a.t_dive, a.t_surface, a.reason != NOT_SURFACED, a.flag, codec.plain_encode(a))
+                (glider, a.t_dive, a.t_surface, _has_ended(a), a.flag, codec.plain_encode(a))
                 for a in outcome.assessments
             ],
         )
@@ -237,3 +236,8 @@ class Store:
     def refused(self, since: float) -> list[Undelivered]:
         """What a channel refused for good, or could not be read, since a time (s); oldest first."""
         return outbox.refused(self._db, since)
+
+
+def _has_ended(dive: Assessment) -> bool:
+    """Whether the fix that ends a dive is known."""
+    return dive.unusable is not Unusable.NOT_SURFACED
