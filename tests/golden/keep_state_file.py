@@ -1,6 +1,7 @@
-"""Keep a state file of today's schema as a test of every later upgrade: `python tests/golden/keep_state_file.py`.
+"""Keep a state file of today's schema for the tests of later upgrades.
 
-Run it on the commit *before* the one that changes the schema or a checkpoint, and commit what it writes:
+`python tests/golden/keep_state_file.py`: run it on the commit *before* the one that changes the
+schema or a checkpoint, and commit what it writes:
 
 - ``schema-N.sqlite.gz``: a simulated glider that a remora slows, its messages delivered, cut as
   `state.keep_days` cuts, so that what came before the first checkpoint cannot be made again;

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from gliderwatch.alerts.escalation import escalated
 from gliderwatch.alerts.outbox import LONGEST_DELAY, OutboxRow
-from gliderwatch.errors import DamagedError
+from gliderwatch.errors import DamagedError, LayoutError
 from gliderwatch.model import Alert
 from gliderwatch.rules import waiting
 from gliderwatch.rules.waiting import AT_ONCE, NO_INCIDENT, Standing
@@ -160,7 +160,7 @@ class Outbox:
         for row in rows:
             try:
                 alert = codec.plain_decode(row[1], Alert)
-            except DamagedError as error:
+            except (DamagedError, LayoutError) as error:
                 self._give_up(row[0], f"given up: {error}", now)
                 continue
             found.append(OutboxRow(row[0], escalated(alert, row[5]) if row[4] else alert, row[2], row[3]))

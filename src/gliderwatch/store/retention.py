@@ -153,8 +153,8 @@ def _results(db: sqlite3.Connection, transaction: Transaction, glider: str) -> I
         "ORDER BY opened_at, name LIMIT 1",
         (glider,),
     ).fetchone()
-    if row is None or row[1] != FIRST:
-        return
+    if row is None or row[1] != FIRST or row[2] is None:
+        return  # without its checkpoint nothing tells where that begins: the next file makes it again
     opened_at, last = row[0], codec.decode(row[2], GliderState).last
     with transaction():
         until = opened_at if last is None else min(opened_at, last.t_dive)
