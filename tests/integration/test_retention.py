@@ -17,11 +17,12 @@ from gliderwatch.pipeline import GliderState
 from gliderwatch.rules.announce import Said
 from gliderwatch.run import intake
 from gliderwatch.run.intake import Speaking
+from gliderwatch.run.posting import post_alerts
+from gliderwatch.run.retention import DAY, HOUR, Retention
 from gliderwatch.store import conversion, retention
 from gliderwatch.store.conversion import moved
 from gliderwatch.store.damage import damage
 from gliderwatch.store.outbox import Outbox
-from gliderwatch.store.retention import DAY, HOUR, Retention
 from gliderwatch.store.segments import RECENT
 from gliderwatch.store.sqlite import File, Status, Store
 from missions import Leg, ending, feed, mission, opened
@@ -178,7 +179,7 @@ def test_an_end_that_was_not_told_keeps_its_incident(store):
     (thread,) = said.threads
     open_ = replace(thread, told=replace(thread.told, cleared_at=None))
     with store.transaction():
-        store.say("unit", replace(said, threads=(open_,)), (), lambda alert: (), 0.0)
+        post_alerts(store, "unit", replace(said, threads=(open_,)), (), lambda alert: (), 0.0)
     clear(store)
     assert len(store.incidents("unit")) == 1
     assert [a.kind for a in intake.speak(store, "unit", PARAMS, ALL, 0.0)] == ["all_clear"]
@@ -367,7 +368,7 @@ class TestDaily:
 def test_said_of_a_glider_without_incidents_is_left_alone(store):
     said = Said(surfaced=5.0)
     with store.transaction():
-        store.say("unit", replace(store.said("unit"), surfaced=5.0), (), lambda alert: (), 0.0)
+        post_alerts(store, "unit", replace(store.said("unit"), surfaced=5.0), (), lambda alert: (), 0.0)
     clear(store)
     assert store.said("unit") == said
 

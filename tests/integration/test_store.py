@@ -22,6 +22,7 @@ from gliderwatch.rules.announce import Said
 from gliderwatch.rules.silence import Sign
 from gliderwatch.run import intake
 from gliderwatch.run.intake import Speaking
+from gliderwatch.run.posting import post_alerts
 from gliderwatch.store import codec, damage, database
 from gliderwatch.store.database import SCHEMA
 from gliderwatch.store.outbox import Outbox
@@ -281,7 +282,7 @@ class TestDamage:
     def test_what_was_told_is_saved_once(self, store, path):
         store.post(alert("a"), ["mail"], 1.0)
         store.post(alert("b"), ["mail", "slack"], 1.0)
-        store.say("electa", Said(surfaced=5.0), [], lambda a: [], 1.0)
+        post_alerts(store, "electa", Said(surfaced=5.0), [], lambda a: [], 1.0)
         store._db.execute("UPDATE outbox SET delivered_at = 2 WHERE alert = 'a'")
         store._db.execute("UPDATE alerts SET data = '{' WHERE id = 'b'")
         store.post(alert("c"), ["mail"], 1.0)
@@ -327,7 +328,14 @@ class TestTransaction:
 
     @pytest.mark.parametrize(
         ("part", "step"),
-        [(Segments, "put"), (Store, "apply"), (Segments, "checkpoint"), (Segments, "thin"), (Store, "say")],
+        [
+            (Segments, "put"),
+            (Store, "apply"),
+            (Segments, "checkpoint"),
+            (Segments, "thin"),
+            (Store, "keep_said"),
+            (Store, "post"),
+        ],
     )
     def test_whatever_fails_on_the_way_leaves_nothing(self, store, monkeypatch, part, step):
         speaking = intake.Speaking(channels=lambda a: ["mail"], notices=lambda g: True)
