@@ -52,6 +52,15 @@ def file(name: str, status: Status = Status.TAKEN, **changes) -> File:
     return replace(File(f"/from-glider/{name}", 10, 20, status), **changes)
 
 
+def without_new_fields(now, then):
+    """A value of JSON with those keys alone that an earlier value has in the same place."""
+    if isinstance(now, dict) and isinstance(then, dict):
+        return {key: without_new_fields(now[key], then[key]) for key in then if key in now}
+    if isinstance(now, list) and isinstance(then, list) and len(now) == len(then):
+        return [without_new_fields(*pair) for pair in zip(now, then, strict=True)]
+    return now
+
+
 class TestOpening:
     def test_the_folder_is_made(self, store, path):
         assert path.exists() and store.gliders() == []
@@ -157,7 +166,8 @@ class TestOpening:
                 "expected": store.forecasts("sim"),
                 "alerts": store.alerts(),
             }
-            assert {name: json.loads(codec.plain_encode(v)) for name, v in found.items()} == then
+            now = {name: json.loads(codec.plain_encode(v)) for name, v in found.items()}
+            assert without_new_fields(now, then) == then
             assert len(then["alerts"]) == 1 and then["incidents"][0]["dives"] > 1
             (open_,), _ = store.incidents("sim"), list(store.remove(cut))
             first = store._db.execute("SELECT min(opened_at) FROM segments").fetchone()[0]
