@@ -1,4 +1,4 @@
-"""The way of one file that opens an incident: how many functions it passes, and how often it crosses packages.
+"""The way of one file that opens an incident: functions that it passes, and crossings between packages.
 
     python benchmarks/opening.py [--edges]
 
@@ -33,7 +33,7 @@ def package(code: CodeType) -> str:
 
 
 def is_ours(code: CodeType) -> bool:
-    """Whether a function is one of gliderwatch; parts of functions (comprehensions, lambdas) are not counted."""
+    """Whether a function is one of gliderwatch; comprehensions and lambdas are not counted."""
     return code.co_filename.startswith(ROOT) and not code.co_name.startswith("<")
 
 
@@ -82,7 +82,18 @@ def run() -> None:
     arguments = parser.parse_args()
     trace, runner = Trace(), CliRunner()
     with tempfile.TemporaryDirectory() as folder:
-        words = ["simulate", folder, "--scenario", "calm", "--fault", "remora:5@3", "--seed", "1", "--days", "5"]
+        words = [
+            "simulate",
+            folder,
+            "--scenario",
+            "calm",
+            "--fault",
+            "remora:5@3",
+            "--seed",
+            "1",
+            "--days",
+            "5",
+        ]
         made = runner.invoke(main, words)
         if made.exit_code:
             sys.exit(made.output)
@@ -99,7 +110,7 @@ def run() -> None:
     functions = {code for edge in trace.opening for code in edge}
     crossings = [edge for edge in trace.opening if package(edge[0]) != package(edge[1])]
     between = Counter((package(a) or "(top)", package(b) or "(top)") for a, b in crossings)
-    print(f"functions {len(functions)}, calls {len(trace.opening)}, crossings between packages {len(crossings)}")
+    print(f"functions {len(functions)}, calls {len(trace.opening)}, crossings {len(crossings)}")
     for (a, b), n in between.most_common():
         print(f"  {a} -> {b}: {n}")
     if arguments.edges:

@@ -48,3 +48,7 @@ class StateError(GliderwatchError):
 
 class DamagedError(StateError):
     """What the state file holds is not what was written: it has to be set aside and made anew."""
+
+
+class LayoutError(StateError):
+    """What the state file holds is whole, but no value that this gliderwatch knows: it is left as it is."""

@@ -26,9 +26,10 @@ from gliderwatch.run import heartbeat
 from gliderwatch.run.heartbeat import DECODING, STALLED, Decoding, Heartbeat, Upkeep
 from gliderwatch.run.life import STALE
 from gliderwatch.run.metrics import Metrics, Outbox
-from gliderwatch.run.operator import HOUR, Failing, Operator, Vitals, Waiting, channels, troubles
+from gliderwatch.run.operator import HOUR, Operator, Vitals, channels, troubles
 from gliderwatch.store import outbox
 from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.store.watch_health import Failing, Waiting
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 NOW = 1_800_000_000.0

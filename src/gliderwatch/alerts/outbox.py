@@ -13,12 +13,14 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from typing import Protocol
 from zlib import crc32
 
 import structlog
 
 from gliderwatch.alerts import message
+from gliderwatch.alerts.escalation import escalated
 from gliderwatch.alerts.worker import Delivery, OutboxRow, Result, Sender, Worker
 from gliderwatch.model import Alert, Severity
 
@@ -194,7 +196,7 @@ class Dispatcher:
                 log.warning("alert parked", **_about(row), reason=error)
             elif worker.row is None:
                 self._waiting.pop(row.id, None)
-                worker.give(row)
+                worker.give(_with_reason(row))
         # a row that is due but waits for its worker needs no alarm clock: the worker's report wakes us
         return min([HEARTBEAT, self._limit, *(t - now for t in self._waiting.values() if t > now)])
 
@@ -244,6 +246,13 @@ class Dispatcher:
             attempts=row.attempts + 1,
             retry_in=round(delay, 1),
         )
+
+
+def _with_reason(row: OutboxRow) -> OutboxRow:
+    """The row with a message that says so where nobody acknowledged its incident."""
+    if row.unacknowledged is None:
+        return row
+    return replace(row, alert=escalated(row.alert, row.unacknowledged))
 
 
 def _report_of(row: OutboxRow, error: str, now: float) -> Alert:

@@ -28,12 +28,17 @@ class Delivery(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class OutboxRow:
-    """One alert for one channel; ``attempts`` counts the failed ones so far."""
+    """One alert for one channel; ``attempts`` counts the failed ones so far.
+
+    ``unacknowledged``: it goes out because nobody acknowledged its incident for so long (s; None: it does
+    not).
+    """
 
     id: int
     alert: Alert
     channel: str
     attempts: int
+    unacknowledged: float | None = None
 
 
 class Sender(Protocol):

@@ -12,13 +12,15 @@ from gliderwatch.params import Attention, GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
 from gliderwatch.rules import overdue, silence, unknown
 from gliderwatch.rules.announce import due
+from gliderwatch.rules.muting import with_mute
+from gliderwatch.run.posting import post_alerts, withdraw_answered
 from gliderwatch.store.sqlite import File, Status, Store
 
 
 @dataclass(frozen=True, slots=True)
 class Speaking:
-    """Who is told: ``channels`` of an alert (a mapping says what they wait for, see `store.outbox.post`), of
-    which gliders surfacing notices are wanted, and how the silence of a glider is taken."""
+    """Who is told: ``channels`` of an alert (a mapping says what they wait for, see `run.posting`), of which
+    gliders surfacing notices are wanted, and how the silence of a glider is taken."""
 
     channels: Callable[[Alert], Iterable[str]]
     notices: Callable[[str], bool]
@@ -105,13 +107,13 @@ def tick(
         said, hours = store.said(glider), speaking.attention(glider).overdue_hours
         silences, alerts = overdue.tick(said.silences, store.known(glider), fleet, hours, now)
         if silences != said.silences:
-            store.say(glider, replace(said, silences=silences), alerts, speaking.channels, now)
+            post_alerts(store, glider, replace(said, silences=silences), alerts, speaking.channels, now)
     return tuple(alerts)
 
 
 def next_tick(store: Store, glider: str, speaking: Speaking, now: float) -> float | None:
     """When `tick` has something to say of a glider next (s), None: never."""
-    attention = store.notes.heeded(glider, speaking.attention(glider))
+    attention = with_mute(speaking.attention(glider), store.notes.muted_until(glider))
     if attention.recovered:
         return None
     at = overdue.next_tick(store.said(glider).silences, store.known(glider), attention.overdue_hours, now)
@@ -157,9 +159,9 @@ def _speak(
 ) -> tuple[Alert, ...]:
     if speaking is None:
         return ()
-    attention = store.notes.heeded(glider, speaking.attention(glider))
+    attention = with_mute(speaking.attention(glider), store.notes.muted_until(glider))
     if attention.is_quiet(now):
-        store.answer(glider, now, quiet=True)
+        withdraw_answered(store, glider, now, quiet=True)
         return ()
     before, known = store.said(glider), store.known(glider)
     silences, heard = overdue.hear(before.silences, known, now)
@@ -173,5 +175,5 @@ def _speak(
     blind, more = unknown.announce(said.unknown, known, attention, params.rules.reminder_hours, now)
     said, alerts = replace(said, unknown=blind), [*heard, *alerts, *more]
     if said != before or alerts:
-        store.say(glider, said, alerts, speaking.channels, now)
+        post_alerts(store, glider, said, alerts, speaking.channels, now)
     return tuple(alerts)

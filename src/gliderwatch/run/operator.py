@@ -6,45 +6,34 @@ What is open is read back from the messages in the state file, so that a restart
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from gliderwatch.alerts import message
 from gliderwatch.alerts.words import duration, utc
 from gliderwatch.config import Config
 from gliderwatch.config.service import Operator as Settings
 from gliderwatch.model import Alert, Severity
+from gliderwatch.rules.muting import with_mute
 from gliderwatch.rules.overdue import outlook
 from gliderwatch.rules.silence import GONE
+from gliderwatch.run.posting import post_alert
 from gliderwatch.run.speaking import Waits, waits
-from gliderwatch.store.database import guarded, read_only
-from gliderwatch.store.outbox import delivery, released
 from gliderwatch.store.sqlite import Store
+from gliderwatch.store.watch_health import (
+    Failing,
+    Waiting,
+    failing,
+    last_files,
+    operator_messages,
+    quarantined,
+    waiting,
+)
 
 DAY, HOUR = 86400.0, 3600.0
 SILENCE, QUARANTINE, WAITING, DISK, CHANNEL = "silence", "quarantine", "waiting", "disk", "channel"
 _ROOT, _OVER = "operator/", "/over"
-
-
-@dataclass(frozen=True, slots=True)
-class Failing:
-    """A channel with messages that it did not take: the oldest was to go out ``since`` (s)."""
-
-    since: float
-    messages: int
-    error: str
-
-
-@dataclass(frozen=True, slots=True)
-class Waiting:
-    """Files of a glider that wait: how many, the oldest ``since`` (s) and why that one does."""
-
-    files: int
-    since: float
-    reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,12 +119,12 @@ def _files(vitals: Vitals, limits: Settings, going_on: set[str], now: float) -> 
                 "They cannot be used as they are. `gliderwatch status` names them with the reason. Many at "
                 "once mean a damaged disk, a transfer that cuts files, or a folder that is no glider's.",
             )
-    for glider, waiting in vitals.waiting.items():
-        late = now - waiting.since
+    for glider, files in vitals.waiting.items():
+        late = now - files.since
         if hours is not None and late > hours * HOUR:
             found[_key(WAITING, glider)] = Trouble(
                 f"files of {glider or 'no known glider'} have waited for {duration(late)}",
-                f"{waiting.files} wait; the oldest since {utc(waiting.since)}: {waiting.reason}.\nThey are "
+                f"{files.files} wait; the oldest since {utc(files.since)}: {files.reason}.\nThey are "
                 "taken once that is mended. `gliderwatch status` names them all.",
             )
     return found
@@ -169,64 +158,9 @@ def channels(config: Config, audience: Severity, key: str) -> Waits:
     return {name: wait for name, wait in found.items() if key != f"{CHANNEL}/{name}"}
 
 
-@contextmanager
-def reading(state: Path) -> Iterator[Any]:
-    """A connection to look with. Raises StateError where the state file cannot be used."""
-    with guarded(state), closing(read_only(state)) as db:
-        yield db
-
-
-def failing(state: Path, now: float) -> dict[str, Failing]:
-    """Channels that failed to take a message that still waits, or that refused one for good in the day before
-    `now` (s) and have delivered none since. What is held does not wait before it is due, and a message that
-    some of a channel's addresses took has been told: the report of the refusal names the others."""
-    with reading(state) as db:
-        since, how = f"max(a.made_at, {released(db)})", delivery(db)
-        sql = (
-            "SELECT channel, min(since), count(*), error FROM ("
-            f"SELECT o.channel, {since} AS since, o.error FROM outbox o JOIN alerts a ON a.id = o.alert "
-            "WHERE o.delivered_at IS NULL AND o.attempts > 0 UNION ALL "
-            f"SELECT o.channel, {since} AS since, o.error FROM outbox o JOIN alerts a ON a.id = o.alert "
-            f"WHERE o.delivered_at > ? AND {how} = 'refused' "
-            "AND NOT EXISTS (SELECT 1 FROM outbox l WHERE l.delivered_at > o.delivered_at "
-            f"AND l.channel = o.channel AND {how} = 'delivered')) GROUP BY channel"
-        )
-        return {row[0]: Failing(*row[1:]) for row in db.execute(sql, (now - DAY,))}
-
-
-def quarantined(state: Path, since: float) -> dict[str, int]:
-    """How many files of each glider were quarantined since a time (s)."""
-    sql = (
-        "SELECT glider, count(*) FROM files WHERE status = 'quarantined' AND noted_at > ? "
-        "GROUP BY glider ORDER BY glider"
-    )
-    with reading(state) as db:
-        return {row[0]: row[1] for row in db.execute(sql, (since,))}
-
-
-def waiting(state: Path) -> dict[str, Waiting]:
-    """The files of each glider that wait; what has gone is not waited for."""
-    sql = (  # of a query with min() SQLite takes the other columns from the row of the minimum
-        "SELECT glider, count(*), min(noted_at), reason FROM files "
-        "WHERE status = 'waiting' AND hindrance != 'gone' GROUP BY glider ORDER BY glider"
-    )
-    with reading(state) as db:
-        return {row[0]: Waiting(*row[1:]) for row in db.execute(sql)}
-
-
-def last_files(state: Path, gliders: Iterable[str]) -> dict[str, float]:
-    """When the newest file of each glider came (s)."""
-    sql = "SELECT at FROM heard WHERE glider = ? ORDER BY opened_at DESC LIMIT 1"
-    with reading(state) as db:
-        found = {glider: db.execute(sql, (glider,)).fetchone() for glider in gliders}
-    return {glider: row[0] for glider, row in found.items() if row is not None}
-
-
 def told(state: Path) -> dict[str, tuple[str, float]]:
     """Troubles that were told and are not over: by key the id of the message and its time (s)."""
-    sql = "SELECT id, time FROM alerts WHERE glider = '' AND id >= ? AND id < ? ORDER BY rowid"
-    with reading(state) as db:
-        rows = {row[0]: row[1] for row in db.execute(sql, (_ROOT, _ROOT[:-1] + "0"))}
+    rows = operator_messages(state, _ROOT)
     ids = [identity for identity in rows if not identity.endswith(_OVER) and identity + _OVER not in rows]
     return {i.removeprefix(_ROOT).rpartition("/")[0]: (i, rows[i]) for i in ids}
 
@@ -269,7 +203,7 @@ class Operator:
             silent = monotonic - self._heard[name]
             if silent < (config.operator.silent_hours or 0.0) * HOUR or silent > GONE:
                 continue  # the look into the state is for the few that are silent
-            attention = self._store.notes.heeded(name, config.attention(name))
+            attention = with_mute(config.attention(name), self._store.notes.muted_until(name))
             found = None if attention.is_quiet(now) else outlook(self._store.known(name), now)
             if found is not None and silent > 2 * (found[0].t - found[0].after):
                 missed[name] = silent
@@ -284,7 +218,7 @@ class Operator:
         if alerts:
             with self._store.transaction():
                 for key, alert in alerts.items():
-                    self._store.post(alert, channels(config, alert.audience, key), now)
+                    post_alert(self._store, alert, channels(config, alert.audience, key), now)
         self._open |= {key: (alert.id, now) for key, alert in began.items()}
         for key in ended:
             del self._open[key]

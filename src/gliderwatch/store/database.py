@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from importlib.resources import files
 from pathlib import Path
 
+import msgspec
+
 from gliderwatch.errors import DamagedError, StateError
+from gliderwatch.store import conversion
 
 __all__ = ["MEMORY", "SCHEMA", "StateError", "connect", "guarded", "read_only", "schema"]
 
@@ -72,8 +75,10 @@ UPDATE files SET hindrance = CASE WHEN status = 'duplicate' AND reason = 'was re
 CREATE INDEX files_by_segment ON files (glider, segment);
 """,
 }
-"""SQL that leads from the schema before to the one of the key. A state file is never written by an older
-gliderwatch than the one that migrated it."""
+"""SQL that leads from the schema before to the one of the key. It may call the functions of
+`conversion.ROW_CONVERTERS`. Only the 2nd sets checkpoints to NULL: nothing before it had `state.keep_days`,
+so all could be made again. A state file is never written by an older gliderwatch than the one that migrated
+it."""
 MEMORY = ":memory:"
 DAMAGE = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
 """Codes of SQLite for a file whose content makes no sense."""
@@ -183,10 +188,17 @@ def _migrate(connection: sqlite3.Connection, path: Path | str) -> None:
         return
     steps = [] if version else [schema()]
     steps += [MIGRATIONS[v] for v in range(max(version, 1) + 1, SCHEMA + 1)]
+    for name, convert in conversion.ROW_CONVERTERS.items():
+        connection.create_function(name, 1, _on_text(convert), deterministic=True)
     with closing(connection.cursor()) as cursor:
         cursor.executescript(
             "BEGIN IMMEDIATE;\n" + "\n".join(steps) + f"\nPRAGMA user_version = {SCHEMA};\nCOMMIT;"
         )
+
+
+def _on_text(convert: conversion.Converter) -> Callable[[str], str]:
+    """A converter as a function of SQL: from JSON text to JSON text."""
+    return lambda text: msgspec.json.encode(convert(msgspec.json.decode(text))).decode()
 
 
 def schema() -> str:

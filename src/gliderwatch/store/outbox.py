@@ -16,12 +16,10 @@ import sqlite3
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
-from gliderwatch.alerts.escalation import escalated
 from gliderwatch.alerts.outbox import LONGEST_DELAY, Delivery, OutboxRow
-from gliderwatch.errors import DamagedError
+from gliderwatch.errors import DamagedError, LayoutError
 from gliderwatch.model import Alert
-from gliderwatch.rules import waiting
-from gliderwatch.rules.waiting import AT_ONCE, NO_INCIDENT, Standing
+from gliderwatch.rules.waiting import Due
 from gliderwatch.store import codec
 from gliderwatch.store.database import DELIVERY_BY_WORDS, connect
 from gliderwatch.store.rows import Undelivered
@@ -39,30 +37,17 @@ HELD = f"(o.held_until > :now AND o.escalates > :now AND :now >= a.made_at - {SE
 """SQL: whether a row of the outbox ``o`` and its message ``a`` is held at a time `now`."""
 
 
-def post(
-    db: sqlite3.Connection,
-    alert: Alert,
-    channels: Iterable[str],
-    now: float,
-    unanswered: Collection[str] = (),
-) -> None:
+def post(db: sqlite3.Connection, alert: Alert, channels: Iterable[str], now: float) -> None:
     """Keep one message and put it into the outbox of its channels; a known id is left alone.
 
-    A mapping of `channels` tells what the recipients of each wait for; of names alone they get it at once.
-    `unanswered` are the threads that go on and that nobody has taken on.
+    A mapping of `channels` tells when it is due by each (`rules.waiting.Due`); by names alone it is at once.
     """
     db.execute(
         "INSERT OR IGNORE INTO alerts VALUES (?, ?, ?, ?, ?)",
         (alert.id, alert.glider, alert.time, now, codec.plain_encode(alert)),
     )
-    waits = channels if isinstance(channels, Mapping) else dict.fromkeys(channels, AT_ONCE)
-    for channel, wait in waits.items():
-        standing = NO_INCIDENT
-        if alert.incident and any(w.after is not None for w in wait):
-            standing = _standing(db, alert.incident, channel, now, alert.incident in unanswered)
-        due = waiting.due(wait, alert.audience, now, standing)
-        if due is None:
-            continue
+    dues = channels if isinstance(channels, Mapping) else dict.fromkeys(channels, Due(0.0, math.inf))
+    for channel, due in dues.items():
         db.execute(
             "INSERT OR IGNORE INTO outbox (alert, channel, incident, held_until, escalates) "
             "VALUES (?, ?, ?, ?, ?)",
@@ -76,14 +61,16 @@ def post(
         )
 
 
-def _standing(db: sqlite3.Connection, incident: str, channel: str, now: float, unanswered: bool) -> Standing:
+def standing(db: sqlite3.Connection, incident: str, channel: str, now: float) -> tuple[bool, float]:
+    """Whether a message of an incident went out by a channel, or is about to, and when what waits there
+    escalates (s; infinite: nothing waits)."""
     told, escalates = db.execute(
         f"SELECT coalesce(max(iif(o.delivered_at IS NULL, NOT {HELD}, o.delivery = 'delivered')), 0), "
         "coalesce(min(iif(o.delivered_at IS NULL, o.escalates, NULL)), 9e999) "
         "FROM outbox o JOIN alerts a ON a.id = o.alert WHERE o.channel = :channel AND o.incident = :incident",
         {"now": now, "channel": channel, "incident": incident},
     ).fetchone()
-    return Standing(bool(told), unanswered, escalates)
+    return bool(told), float(escalates)
 
 
 def withdraw(db: sqlite3.Connection, glider: str, unanswered: Collection[str], now: float) -> None:
@@ -148,8 +135,8 @@ class Outbox:
         """Undelivered rows to try now, oldest first, none before an older one of its thread and channel.
 
         A row that cannot be read is given up, so that it keeps no other back. One whose time is farther off
-        than any delay was put off by a clock that has been set back since: it is due. One that goes out
-        because nobody has acknowledged its incident says so.
+        than any delay was put off by a clock that has been set back since: it is due. Of one that goes out
+        because nobody has acknowledged its incident, ``unacknowledged`` is how long that was waited for (s).
         """
         rows = self._db.execute(
             "SELECT o.id, a.data, o.channel, o.attempts, o.held_until > :now AND o.escalates < 9e999, "
@@ -164,10 +151,10 @@ class Outbox:
         for row in rows:
             try:
                 alert = codec.plain_decode(row[1], Alert)
-            except DamagedError as error:
+            except (DamagedError, LayoutError) as error:
                 self._give_up(row[0], Delivery.UNREADABLE, f"given up: {error}", now)
                 continue
-            found.append(OutboxRow(row[0], escalated(alert, row[5]) if row[4] else alert, row[2], row[3]))
+            found.append(OutboxRow(row[0], alert, row[2], row[3], row[5] if row[4] else None))
         return found
 
     def delivered(self, row_id: int, now: float) -> None:
