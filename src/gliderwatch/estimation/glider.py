@@ -62,10 +62,10 @@ def step(
         after = state if learnt is state.learner else replace(state, learner=learnt)
     if dive.track is None or dive.start is None or dive.end is None:
         return after, assessment
-    evidence = {**assessment.evidence, **told(state.baseline, dive.evidence)}
+    evidence = {**assessment.evidence, **told(state.baseline, dive.features)}
     after = _with_currents(replace(after, end=dive.end), dive, params, assessment.flag)
     if assessment.flag == Flag.NORMAL and not frozen:
-        after = replace(after, baseline=learn(state.baseline, dive.evidence))
+        after = replace(after, baseline=learn(state.baseline, dive.features))
     return after, replace(assessment, evidence=evidence)
 
 

@@ -117,8 +117,8 @@ def step(
     if other is not None:
         judged = replace(judged, notes=(*judged.notes, *other.notes))
     if params.speed_learnt and judged.flag == Flag.NORMAL and not frozen:
-        hours = dive.evidence.get("duration_h", 0.0)
-        normal = learn(state.normal, info.speed, setting(dive.evidence), hours, RangeParams())
+        duration = dive.features.duration
+        normal = learn(state.normal, info.speed, setting(dive.features), duration, RangeParams())
         state = replace(state, normal=normal)
     return state, replace(judged, evidence={**judged.evidence, **_past(before)})
 
@@ -144,7 +144,7 @@ def _with_range(state: Learner, dive: Dive, params: GliderParams) -> GliderParam
     """The parameters with the range of speed that was learnt, once there is one."""
     if not params.speed_learnt:
         return params
-    found = speed_range(state.normal, setting(dive.evidence), RangeParams())
+    found = speed_range(state.normal, setting(dive.features), RangeParams())
     return params if found is None else replace(params, speed_min=found.low, speed_max=found.high)
 
 
@@ -165,8 +165,8 @@ def _begin(state: Learner, dive: Dive, start: Fix, params: GliderParams) -> Lear
     """A new estimate at the start of a deployment, else the state as it is."""
     if state.learner is not None and state.end is not None and not are_apart(state.end, start):
         return state if dive.t_dive - state.end.t < STALE else replace(state, warm=0.0)
-    believed = closure(dive.track, dive.current) if dive.track and dive.current else {}
-    speed = believed.get("along_speed", dive.evidence.get("onboard_speed"))
+    closed = closure(dive.track, dive.current) if dive.track and dive.current else None
+    speed = closed.along_speed if closed is not None else dive.features.onboard_speed
     if speed is None or not 0.0 < speed < 2 * params.speed_max:
         speed = (params.speed_min + params.speed_max) / 2
     planned = np.array(params.learner.centres, dtype=np.float64).reshape(-1, 2)
