@@ -25,7 +25,7 @@ from gliderwatch.params import GliderParams
 class Estimate:
     """State of the estimator of one glider after a dive.
 
-    ``joint`` of the estimator `joint`, ``learner`` of `adaptive` and `composite`; the one that is not chosen
+    ``joint`` of the estimator `joint`, ``learner`` of `adaptive`; the one that is not chosen
     stays empty. ``baseline`` of what corroborates, ``currents`` of the dives where the reference is their
     forecast; ``end``, the fix that ended the last dive.
     """
