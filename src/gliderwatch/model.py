@@ -147,12 +147,51 @@ class Unusable(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class DiveFeatures:
+    """What the files say of how a dive was flown: the numbers that decisions read. None where unknown.
+
+    Times in s: ``duration`` of the flight, ``fix_gap`` from its end to the fix after it, ``drift`` at the
+    surface between both fixes, ``heading_gap`` the longest time without a heading where that is long,
+    ``unobserved`` the time without any data. ``ground_speed`` between the fixes and ``onboard_speed``, the
+    mean of what the glider believes, in m/s. ``heading_steadiness`` is the length of the mean heading vector
+    in flight (0: circled, 1: straight), ``heading_mean`` its direction (rad, clockwise from north),
+    ``heading_commanded`` the part of headings that were commanded, not measured. ``depth_max`` in m; means of
+    ``pitch_dive``, ``pitch_climb``, ``roll_mean`` and the spread ``roll_std`` in rad, nose up and to
+    starboard positive; ``thruster`` the part of the time that it was on; ``depth_rate_dive`` and
+    ``depth_rate_climb`` in m/s, down positive; ``yos`` turns from dive to climb; ``ballast_dive`` and
+    ``ballast_climb`` the volume pumped (m3); ``vacuum`` in Pa.
+    """
+
+    duration: float
+    fix_gap: float | None = None
+    drift: float | None = None
+    ground_speed: float | None = None
+    heading_steadiness: float | None = None
+    heading_mean: float | None = None
+    heading_commanded: float = 0.0
+    depth_max: float | None = None
+    pitch_dive: float | None = None
+    pitch_climb: float | None = None
+    roll_mean: float | None = None
+    roll_std: float | None = None
+    onboard_speed: float | None = None
+    thruster: float | None = None
+    depth_rate_dive: float | None = None
+    depth_rate_climb: float | None = None
+    yos: int | None = None
+    ballast_dive: float | None = None
+    ballast_climb: float | None = None
+    vacuum: float | None = None
+    heading_gap: float | None = None
+    unobserved: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Dive:
     """What happened between the fix before and the fix after one dive.
 
     ``unusable`` is None and ``reason`` empty when the dive can be used for estimation; otherwise they say
-    why not, for decisions and in words, and ``track`` is None. ``evidence`` holds numbers that speak for or
-    against a fault (`docs/nomenclature.md`), None-free.
+    why not, for decisions and in words, and ``track`` is None.
     """
 
     glider: str
@@ -165,7 +204,7 @@ class Dive:
     current: Current | None
     reason: str
     n_samples: int
-    evidence: Mapping[str, float]
+    features: DiveFeatures
     notes: tuple[str, ...] = ()
     unusable: Unusable | None = None
 

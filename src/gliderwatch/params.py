@@ -31,8 +31,6 @@ class LearnerParams:
     """Phase of the basis functions (rad)."""
     max_speed: float | None = None
     """Speed at which the glider's through-water speed saturates (m/s); None: it does not."""
-    flow_gain: float = 1 / 3600
-    """Rate (1/s) at which the estimator `composite` draws the learnt flow to the reference."""
     centres: tuple[tuple[float, float], ...] = ()
     """Planned centres (latitude, longitude in degrees); empty: grown along the way."""
 
@@ -74,7 +72,7 @@ class GliderParams:
     speed_max: float = 0.75
     speed_learnt: bool = True
     """Whether a range learnt from the first healthy dives takes the place of the two above."""
-    estimator: Literal["joint", "adaptive", "composite"] = "joint"
+    estimator: Literal["joint", "adaptive"] = "joint"
     reference: Literal["dac", "tides", "learnt", "model"] = "dac"
     """The flow F_M that the estimated one is compared with."""
     gamma_f: float = 0.3

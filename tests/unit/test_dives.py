@@ -63,8 +63,8 @@ class TestHealthy:
         _, dives = told(mission(LEGS, declination=declination))
         for dive in dives[:3]:
             out = closure(dive.track, dive.current)
-            assert out["along_speed"] == pytest.approx(0.3, abs=1e-3)
-            assert out["across_misfit"] == pytest.approx(0.0, abs=1e-3)
+            assert out.along_speed == pytest.approx(0.3, abs=1e-3)
+            assert out.across_misfit == pytest.approx(0.0, abs=1e-3)
 
     def test_the_dive_lies_between_its_fixes(self):
         _, dives = told(mission(LEGS))

@@ -80,7 +80,7 @@ def test_hours_without_data_are_no_interval():
     late = replace(
         dives[5],
         end=replace(dives[5].end, t=dives[5].end.t + 6 * HOUR),
-        evidence={**dives[5].evidence, "unobserved_h": 6.0},
+        features=replace(dives[5].features, unobserved=6.0 * HOUR),
     )
     expected = expect(after([*dives[:5], late]), SPEED, SIGMA, steady())
     assert expected.after == late.end.t

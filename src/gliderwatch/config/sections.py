@@ -44,7 +44,7 @@ class Detection(Section):
 
     gamma_f: Annotated[Number, Field(ge=0, le=1)] = Field(
         default=_G.gamma_f,
-        description="Flow error p_E (0 to 1) above which `adaptive` and `composite` give flag 2, and any "
+        description="Flow error p_E (0 to 1) above which `adaptive` gives flag 2, and any "
         "estimator where the reference is not the DAC; 1: never.",
     )
     alarms_per_month: Annotated[Number, Field(gt=0, le=30)] = Field(
@@ -54,7 +54,7 @@ class Detection(Section):
 
 
 class Adaptive(Section):
-    """Gains and basis functions of the trajectory learner (estimators `adaptive` and `composite`)."""
+    """Gains and basis functions of the trajectory learner (estimator `adaptive`)."""
 
     kernel: Literal["exponential", "gaussian"] = Field(
         default=_E.kernel,
@@ -78,10 +78,6 @@ class Adaptive(Section):
     )
     nu: Annotated[Number, Field(ge=-6.3, le=6.3)] = Field(
         default=_E.nu, description="Phase of the basis functions (rad)."
-    )
-    flow_gain: Annotated[Number, Field(gt=0, le=0.1)] = Field(
-        default=_E.flow_gain,
-        description="Rate (1/s) at which `composite` draws the learnt flow to the reference.",
     )
     max_speed: Annotated[Number, Field(gt=0, le=5)] | None = Field(
         default=_E.max_speed, description="Speed (m/s) at which the estimate saturates; null: it does not."
@@ -139,10 +135,10 @@ class Preset(Section):
     """Settings of one published deployment (`config/presets.yml`)."""
 
     normal_speed: NormalSpeed = Field(default=NormalSpeed(), description="Normal speeds.")
-    estimator: Literal["joint", "adaptive", "composite"] = Field(
+    estimator: Literal["joint", "adaptive"] = Field(
         default=_G.estimator,
         description="`joint`: speed, flow and their uncertainty from fixes, headings and currents; "
-        "`adaptive`: the trajectory learner of the papers; `composite`: the same, drawn to the reference.",
+        "`adaptive`: the trajectory learner of the papers.",
     )
     reference: Literal["dac", "tides", "learnt", "model"] = Field(
         default=_G.reference,

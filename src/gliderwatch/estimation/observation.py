@@ -149,10 +149,11 @@ def _heading_cov(vectors: Array, share: Array, dive: Dive, interval: float) -> A
     steps = np.diff(vectors, axis=0)
     swings = 2 * (steps.T @ steps + CONTROL**2 * np.eye(2)) / (len(steps) + 1)
     aside = np.array([-mean[1], mean[0]])
-    off = math.hypot(COMPASS, COMMANDED * dive.evidence.get("heading_commanded", 0.0))
+    off = math.hypot(COMPASS, COMMANDED * dive.features.heading_commanded)
     turned = (off * flown) ** 2 * np.outer(aside, aside)
     uneven = (UNEVEN * flown) ** 2 * max(0.0, 1 - float(mean @ mean)) / 2
-    missing = UNSEEN * dive.evidence.get("unobserved_h", 0.0) * 3600 / interval
+    # by way of hours, which keeps the last bit of every estimate of the missions on record
+    missing = UNSEEN * (dive.features.unobserved / 3600) * 3600 / interval
     return np.asarray(swings * float(share @ share) + turned + (uneven + missing**2) * np.eye(2))
 
 
@@ -162,7 +163,8 @@ def _slip(dive: Dive) -> float:
     In a steady glide alpha = C_D / (a tan(theta + alpha)) (Merckelbach et al. 2010), and
     1 - tan(theta) / tan(theta + alpha) = alpha / (sin theta cos theta) to first order.
     """
-    pitches = [abs(dive.evidence[name]) for name in ("pitch_dive", "pitch_climb") if name in dive.evidence]
+    both = (dive.features.pitch_dive, dive.features.pitch_climb)
+    pitches = [abs(pitch) for pitch in both if pitch is not None]
     return slip_at(sum(pitches) / len(pitches) if pitches else USUAL_PITCH)
 
 

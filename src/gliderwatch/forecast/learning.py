@@ -26,8 +26,8 @@ STEADY = 0.3
 """Length of the mean heading vector from which the speed of a dive shows."""
 SLOWEST, FASTEST = 0.05, 1.5
 """Bounds of the speed (m/s) that a glider believes."""
-UNSEEN = 0.5
-"""Hours without data in which a glider may have been up."""
+UNSEEN = 1800.0
+"""s without data in which a glider may have been up."""
 
 
 def learn(
@@ -57,7 +57,7 @@ def learn(
 
 def is_unseen(dive: Dive) -> bool:
     """Whether data are missing before the end of a dive, so that the glider may have been up unnoticed."""
-    return dive.evidence.get("unobserved_h", 0.0) > UNSEEN or dive.unusable is Unusable.DATA_MISSING
+    return dive.features.unobserved > UNSEEN or dive.unusable is Unusable.DATA_MISSING
 
 
 def _is_stale(dive: Dive) -> bool:

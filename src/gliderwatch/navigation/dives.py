@@ -8,15 +8,15 @@ and a dive is told again when more of it is known.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 
 from gliderwatch.model import Dive, Fix, Segment, Unusable
 from gliderwatch.navigation.current import Known, Report, new_reports, pair, updated
+from gliderwatch.navigation.features import flight_features, track_features
 from gliderwatch.navigation.fixes import FASTEST, SUSPECT, distance, new_fixes, stays
 from gliderwatch.navigation.flight import SPARSE, Flight, find_flight, lengthened, unseen
 from gliderwatch.navigation.quality import flight_notes, heading_gap, segment_notes, why_unusable
 from gliderwatch.navigation.samples import Samples, after, concatenated, get, prepare
-from gliderwatch.navigation.track import attitude, build_track, evidence
+from gliderwatch.navigation.track import build_track
 
 SHORTEST = 900.0
 """Seconds: a shorter stay under water says too little of speed, a shorter hole in the data is none."""
@@ -166,17 +166,19 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
     start, seen = state.fix, flight
     if end is not None:
         flight = lengthened(flight, samples, end.t, state.holes)
-    missing = sum(min(b, end.t) - a for a, b in state.holes if a < end.t) if end is not None else 0.0
+    missing = sum((min(b, end.t) - a for a, b in state.holes if a < end.t), 0.0) if end is not None else 0.0
     unusable, reason = why_unusable(samples, flight, start, end, missing)
     if start is None or end is None or unusable is not None:
         track = None
-        numbers = {"duration_h": flight.duration / 3600} | attitude(samples, flight)
+        features = flight_features(samples, flight)
     else:
         track = build_track(samples, flight, start, end)
-        numbers = evidence(samples, flight, track)
         gap = heading_gap(samples, flight)
-        numbers |= {"heading_gap_h": gap / 3600} if gap > 2 * SPARSE else {}
-        numbers |= {"unobserved_h": missing / 3600} if missing else {}
+        features = replace(
+            track_features(samples, flight, track),
+            heading_gap=gap if gap > 2 * SPARSE else None,
+            unobserved=missing,
+        )
     return Dive(
         glider=glider,
         segment=state.holder,
@@ -188,8 +190,8 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
         current=None,
         reason=reason,
         n_samples=len(get(samples, "heading_e").between(flight.start, flight.end)),
-        evidence=MappingProxyType(numbers),
-        notes=state.notes + flight_notes(flight, numbers),
+        features=features,
+        notes=state.notes + flight_notes(flight, features),
         unusable=unusable,
     )
 

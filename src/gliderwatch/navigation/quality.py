@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from gliderwatch.model import Fix, Segment, Unusable
+from gliderwatch.model import DiveFeatures, Fix, Segment, Unusable
 from gliderwatch.navigation.fixes import FASTEST, distance
 from gliderwatch.navigation.flight import SPARSE, Flight
 from gliderwatch.navigation.samples import Samples, get
@@ -80,15 +78,15 @@ def segment_notes(segment: Segment, declination: float | None, from_model: bool)
     return tuple(notes)
 
 
-def flight_notes(flight: Flight, numbers: Mapping[str, float]) -> tuple[str, ...]:
+def flight_notes(flight: Flight, features: DiveFeatures) -> tuple[str, ...]:
     """What a reader of the assessment should know of the quality of a dive."""
     notes = []
     if flight.evidence == "heading":
         notes.append("no depth or pitch in the file: drift at the surface cannot be told from flight")
-    if numbers.get("heading_steadiness", 1.0) < max(CIRCLING, 0.5):
+    if features.heading_steadiness is not None and features.heading_steadiness < max(CIRCLING, 0.5):
         notes.append("the glider turned much: its speed is hardly observable")
-    if "heading_gap_h" in numbers:
-        notes.append(f"no heading for {numbers['heading_gap_h']:.1f} h of the dive: taken as steady")
-    if "unobserved_h" in numbers:
-        notes.append(f"{numbers['unobserved_h']:.1f} h without data within the dive")
+    if features.heading_gap is not None:
+        notes.append(f"no heading for {features.heading_gap / 3600:.1f} h of the dive: taken as steady")
+    if features.unobserved:
+        notes.append(f"{features.unobserved / 3600:.1f} h without data within the dive")
     return tuple(notes)

@@ -7,6 +7,7 @@ of the state".
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from functools import reduce
 from typing import Any
@@ -33,20 +34,41 @@ UNUSABLE_BEGINS = {
 """Of layout 1: what the words of a dive said of why it cannot be used."""
 
 
-def with_unusable(state: Any) -> Any:
-    """Layout 1 to 2: why a dive cannot be used is a word of its own beside the reason.
+HOUR, MINUTE = 3600.0, 60.0
+FEATURES = {
+    "duration_h": ("duration", HOUR),
+    "drift_h": ("drift", HOUR),
+    "heading_gap_h": ("heading_gap", HOUR),
+    "unobserved_h": ("unobserved", HOUR),
+    "fix_gap_minutes": ("fix_gap", MINUTE),
+    "heading_mean": ("heading_mean", math.pi / 180),
+}
+"""Of layout 1: numbers of a dive that were not in SI, with their names and factors since."""
+
+
+def typed_dives(state: Any) -> Any:
+    """Layout 1 to 2: the numbers of a dive are typed features in SI, and why it cannot be used is a word of
+    its own beside the reason.
 
     Incidents hold assessments too: those have a flag, so they are of dives that could be used.
     """
-    for dive in (state["navigation"]["dive"], state["last"], state["assessment"]):
+    dives = [state["navigation"]["dive"], state["last"]]
+    for dive in (*dives, state["assessment"]):
         if dive is not None:
             reason = dive["reason"]
             begun = next((to for words, to in UNUSABLE_BEGINS.items() if reason.startswith(words)), None)
             dive["unusable"] = UNUSABLE.get(reason, begun)
+    for dive in dives:
+        if dive is not None:
+            features = {}
+            for name, value in dive.pop("evidence").items():
+                new, factor = FEATURES.get(name, (name, 1.0))
+                features[new] = int(value) if new == "yos" else value * factor
+            dive["features"] = features
     return state
 
 
-CONVERTERS: Mapping[type, tuple[Converter, ...]] = {GliderState: (with_unusable,), Segment: ()}
+CONVERTERS: Mapping[type, tuple[Converter, ...]] = {GliderState: (typed_dives,), Segment: ()}
 """For each kind of record the way from layout 1 to today's: the n-th leads from layout n to n + 1. What is in
 it stays in it, for records of every layout are in use somewhere."""
 
