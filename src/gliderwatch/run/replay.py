@@ -29,7 +29,7 @@ from gliderwatch.run.lines import alert_line, assessment_line, write_lines
 from gliderwatch.run.ocean import Ocean
 from gliderwatch.run.speaking import NOBODY, speaking
 from gliderwatch.run.turns import Turns
-from gliderwatch.store.database import MEMORY
+from gliderwatch.store.database import MEMORY, refuse_foreign
 from gliderwatch.store.outbox import Outbox
 from gliderwatch.store.sqlite import Status, Store
 
@@ -147,6 +147,7 @@ def _fresh(path: Path, config: Config | None) -> Path:
     """A state file of which nothing is there: what an earlier replay left is removed."""
     if alive_path(path).exists() or (config is not None and path.resolve() == Path(config.state.path)):
         raise GliderwatchError(f"{path} is the state of a daemon: choose another folder for --out")
+    refuse_foreign(path, "Choose another folder for --out")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         for old in (path, *path.parent.glob(f"{path.name}-*")):
