@@ -21,7 +21,7 @@ import structlog
 from gliderwatch.config import Config, load
 from gliderwatch.errors import ConfigError, DamagedError, GliderwatchError
 from gliderwatch.ingest.watch import CacheChanged, EventsLost, FileChanged
-from gliderwatch.run import arrivals, heartbeat, intake, notify, recovery
+from gliderwatch.run import arrivals, intake, notify, preconditions, recovery
 from gliderwatch.run.heartbeat import Upkeep
 from gliderwatch.run.life import BEAT, Life
 from gliderwatch.run.parts import Decoded, News, Parts, build
@@ -48,6 +48,9 @@ class Daemon:
     def __init__(self, config: Config, config_path: Path, workers: int = 2) -> None:
         self._config_path, self._workers = config_path, workers
         self._state = Path(config.state.path)
+        preconditions.require(
+            config, config_path
+        )  # before anything is made beside what may be another's file
         self._life = Life(self._state)
         self._store = recovery.open_state(config)
         self._trouble = Trouble(self._store, self._is_stopping)
@@ -260,7 +263,7 @@ class Daemon:
             config = load(self._config_path)
             if Path(config.state.path) != self._state:
                 raise ConfigError("state.path can only be changed by a restart")
-            heartbeat.url(config)
+            preconditions.require(config, self._config_path)
             parts = build(config, self._news, self._wake, self._workers, before)
         except GliderwatchError as error:
             log.error("configuration refused, the old one is kept", path=path, reason=str(error))

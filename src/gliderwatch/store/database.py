@@ -13,7 +13,17 @@ from pathlib import Path
 from gliderwatch.errors import DamagedError, StateError
 from gliderwatch.store.ownership import APPLICATION_ID, foreign
 
-__all__ = ["MEMORY", "SCHEMA", "StateError", "connect", "guarded", "read_only", "refuse_foreign", "schema"]
+__all__ = [
+    "MEMORY",
+    "SCHEMA",
+    "StateError",
+    "connect",
+    "current",
+    "guarded",
+    "read_only",
+    "refuse_foreign",
+    "schema",
+]
 
 SCHEMA = 4
 MIGRATIONS: dict[int, str] = {
@@ -146,6 +156,19 @@ def read_only(path: Path) -> sqlite3.Connection:
         except BaseException:
             connection.close()
             raise
+    return connection
+
+
+def current(path: Path) -> sqlite3.Connection:
+    """As `read_only`, of this schema. Raises StateError where the service has to migrate the file first."""
+    connection = read_only(path)
+    version = connection.execute("PRAGMA user_version").fetchone()[0]
+    if version < SCHEMA:
+        connection.close()
+        raise StateError(
+            f"state file {path} is of an earlier release (schema {version}, now {SCHEMA}). "
+            "What to do: systemctl restart gliderwatch, which takes it on"
+        )
     return connection
 
 

@@ -10,10 +10,9 @@ from pathlib import Path
 from gliderwatch.alerts import message
 from gliderwatch.alerts.channels import Channel, DeliveryError
 from gliderwatch.alerts.words import duration
-from gliderwatch.config import Config, Problem, references
+from gliderwatch.config import Config, Problem
 from gliderwatch.errors import ConfigError, DamagedError, StateError
 from gliderwatch.model import Severity
-from gliderwatch.run import heartbeat
 from gliderwatch.run.doctor.finding import Finding, Findings, Level, error, note, ok, warning
 from gliderwatch.run.life import STALE, is_held, silence
 from gliderwatch.run.operator import failing, reading
@@ -39,8 +38,11 @@ def of_check(topic: str, problems: Iterable[Problem], *keys: str) -> list[Findin
 
 def state(config: Config, problems: Iterable[Problem]) -> Findings:
     """Whether the state file opens, is whole, and of a schema that is known."""
-    yield from of_check("state", problems, "state.")
+    found = of_check("state", problems, "state.")
+    yield from found
     path = Path(config.state.path)
+    if any(f.level == Level.ERROR for f in found):
+        return
     if not path.exists():
         yield note("state", f"{path} is not there yet: the service makes it at its first start")
         return
@@ -86,24 +88,14 @@ def channels(config: Config, problems: Iterable[Problem], send: bool) -> Finding
             yield ok("channels", f"{name} {said}")
 
 
-def sign(config: Config) -> Findings:
+def sign(config: Config, problems: Iterable[Problem]) -> Findings:
     """Whether a sign of life can be given to a dead man's switch."""
-    settings = config.heartbeat
-    template = settings.url.get_secret_value() if settings.url is not None else ""
-    found = []
-    try:
-        heartbeat.url(config)
-    except ConfigError as problem:
-        if references.needs_credentials(template) and references.CREDENTIALS not in os.environ:
-            cure = "credentials are only there inside of the service"
-            found.append(warning("heartbeat", str(problem), cure))
-        else:
-            found.append(error("heartbeat", str(problem), "correct it: the service does not start with it"))
+    settings, found = config.heartbeat, of_check("heartbeat", problems, "heartbeat.")
     if settings.file is not None:
         file = Path(settings.file)
         if not os.access(file if file.exists() else file.parent, os.W_OK):
             found.append(error("heartbeat", f"{file} cannot be written by this user", "name another file"))
-    if not found and (template or settings.file is not None):
+    if not found and (settings.url is not None or settings.file is not None):
         found = [ok("heartbeat", f"every {settings.minutes:g} min while all is well")]
     yield from found
 
