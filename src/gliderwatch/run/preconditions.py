@@ -1,6 +1,6 @@
-"""What has to hold before the service starts: one list for `run`, which refuses, `check` and `doctor`, which say so.
+"""What has to hold before the service starts: one list for `run`, which refuses, for `check` and `doctor`.
 
-What hinders only now is not in it: another gliderwatch that uses the state file, a program that holds it locked.
+What hinders only now is not in it: another gliderwatch that uses the state file, a program that locks it.
 """
 
 from __future__ import annotations

@@ -35,6 +35,9 @@ from gliderwatch.store.sqlite import Status, Store
 
 STATE = "replay.sqlite"
 """Name of the state file in the folder of results: another one than a daemon's usual."""
+ASSESSMENTS, ALERTS = "assessments.jsonl", "alerts.jsonl"
+WRITTEN = (ASSESSMENTS, ALERTS, STATE)
+"""All that is left in the folder of results."""
 SEND_PATIENCE = 120.0
 """Seconds that `--send` waits at the end for messages to be delivered."""
 
@@ -106,12 +109,16 @@ def replay(
 
 
 def find_files(folders: Iterable[Path]) -> list[Path]:
-    """All flight data files below some folders, each once; links are followed, for who replays chose them."""
+    """All flight data files below some folders, each once.
+
+    The folders may be links. Below them a link is treated as the service does: a file that is one is named
+    and left alone, a folder that is one is not looked into.
+    """
     found = {
-        path.resolve() if path.is_symlink() else path: None
+        path: None
         for folder in folders
         for path in sorted([folder] if folder.is_file() else folder.rglob("*"))
-        if names.kind(path.name) is not None and not path.is_dir()
+        if names.kind(path.name) is not None and (path.is_symlink() or not path.is_dir())
     }
     return list(found)
 
@@ -271,5 +278,5 @@ def _count(taken: intake.Taken, report: Report, on_file: Callable[[intake.Taken]
 
 def _write(out: Path, store: Store) -> None:
     assessments = (assessment_line(a) for glider in store.gliders() for a in store.assessments(glider))
-    write_lines(out / "assessments.jsonl", assessments)
-    write_lines(out / "alerts.jsonl", (alert_line(a) for a in store.alerts()))
+    write_lines(out / ASSESSMENTS, assessments)
+    write_lines(out / ALERTS, (alert_line(a) for a in store.alerts()))

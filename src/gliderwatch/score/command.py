@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from gliderwatch.score.work import Task
 
 
-@click.command()
+@click.command(epilog="\b\nExample:\n  gliderwatch score --grid small --out score")
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),

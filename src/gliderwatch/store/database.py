@@ -18,7 +18,6 @@ __all__ = [
     "SCHEMA",
     "StateError",
     "connect",
-    "current",
     "guarded",
     "read_only",
     "refuse_foreign",
@@ -76,6 +75,7 @@ DAMAGE = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
 _ROOM = "make room on its disk: it goes on by itself, nothing is lost"
 _WRITE = "let the user of the service write there, on a disk that is not mounted read-only"
 _CURES = {
+    sqlite3.SQLITE_ERROR: "systemctl restart gliderwatch, which takes on a file of an earlier release",
     sqlite3.SQLITE_FULL: _ROOM,
     sqlite3.SQLITE_IOERR: f"see what the kernel says of its disk (dmesg); where that is full, {_ROOM}",
     sqlite3.SQLITE_READONLY: _WRITE,
@@ -156,19 +156,6 @@ def read_only(path: Path) -> sqlite3.Connection:
         except BaseException:
             connection.close()
             raise
-    return connection
-
-
-def current(path: Path) -> sqlite3.Connection:
-    """As `read_only`, of this schema. Raises StateError where the service has to migrate the file first."""
-    connection = read_only(path)
-    version = connection.execute("PRAGMA user_version").fetchone()[0]
-    if version < SCHEMA:
-        connection.close()
-        raise StateError(
-            f"state file {path} is of an earlier release (schema {version}, now {SCHEMA}). "
-            "What to do: systemctl restart gliderwatch, which takes it on"
-        )
     return connection
 
 

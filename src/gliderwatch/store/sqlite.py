@@ -12,7 +12,7 @@ from gliderwatch.navigation.quality import NOT_SURFACED
 from gliderwatch.pipeline import Outcome
 from gliderwatch.rules.announce import Said, unanswered
 from gliderwatch.store import codec, outbox, retention
-from gliderwatch.store.database import MEMORY, SCHEMA, connect, current, guarded
+from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, read_only
 from gliderwatch.store.known import Known
 from gliderwatch.store.notes import Notes
 from gliderwatch.store.rows import File, Status, Undelivered, file_of, values
@@ -40,9 +40,8 @@ class Store:
 
     @classmethod
     def reading(cls, path: Path) -> Store:
-        """The store at a path, for looking only. Raises StateError where there is none, or one that is to be
-        migrated first."""
-        return cls(current(path), path)
+        """The store at a path, for looking only. Raises StateError where there is none."""
+        return cls(read_only(path), path)
 
     def close(self) -> None:
         """Give the connection back."""

@@ -15,9 +15,7 @@ from gliderwatch.run import preconditions
 from gliderwatch.run.doctor import data, machine, service
 from gliderwatch.run.doctor.finding import Finding, as_lines, error, exit_code, ok, report, summary
 
-__all__ = ["DEFAULT", "Finding", "as_lines", "examine", "exit_code", "report", "summary"]
-
-DEFAULT = Path("/etc/gliderwatch/gliderwatch.yml")
+__all__ = ["Finding", "as_lines", "examine", "exit_code", "report", "summary"]
 
 
 def examine(path: Path, *, send: bool = False) -> Iterator[Finding]:

@@ -9,10 +9,11 @@ from pathlib import Path
 
 from gliderwatch.alerts import message
 from gliderwatch.alerts.channels import Channel, DeliveryError
+from gliderwatch.alerts.samples import sample
 from gliderwatch.alerts.words import duration
 from gliderwatch.config import Config, Problem
 from gliderwatch.errors import ConfigError, DamagedError, StateError
-from gliderwatch.model import Severity
+from gliderwatch.model import Alert, Kind, Severity
 from gliderwatch.run.doctor.finding import Finding, Findings, Level, error, note, ok, warning
 from gliderwatch.run.life import STALE, is_held, silence
 from gliderwatch.run.operator import failing, reading
@@ -66,9 +67,10 @@ def state(config: Config, problems: Iterable[Problem]) -> Findings:
 
 def channels(config: Config, problems: Iterable[Problem], send: bool) -> Findings:
     """Whether channels can be reached and do deliver; with `send`, a test message goes through each."""
-    found = of_check("channels", problems, "channels", "recipients")
-    yield from found
-    bad = {f.text.split(".")[1] for f in found if ": channels." in f.text and f.level == Level.ERROR}
+    problems = list(problems)
+    yield from of_check("channels", problems, "channels", "recipients")
+    urls = {name: f"channels.{name}.url: " for name in config.channels}
+    bad = {name for name, key in urls.items() if any(p.text.startswith(key) for p in problems)}
     waiting = failing(Path(config.state.path), time.time()) if Path(config.state.path).exists() else {}
     for name in config.channels:
         trouble = waiting.get(name)
@@ -100,10 +102,22 @@ def sign(config: Config, problems: Iterable[Problem]) -> Findings:
     yield from found
 
 
-def try_channel(config: Config, name: str) -> str | None:
-    """Send a test message; why it was not delivered, None when it was."""
-    now = time.time()
-    alert = message.operator(
+def sample_for(kind: str) -> Alert:
+    """A whole message of a kind, as it would come now."""
+    return sample(Kind(kind), time.time())
+
+
+def try_channel(config: Config, name: str, alert: Alert | None = None) -> str | None:
+    """Send a test message, or an `alert`; why it was not delivered, None when it was."""
+    try:
+        Channel(name, config.channel_url(name).get_secret_value()).send(alert or _test(name, time.time()))
+    except (DeliveryError, ConfigError) as problem:
+        return str(problem)
+    return None
+
+
+def _test(name: str, now: float) -> Alert:
+    return message.operator(
         "test of a channel",
         f"If you can read this, the channel {name} of gliderwatch works.",
         now,
@@ -111,11 +125,6 @@ def try_channel(config: Config, name: str) -> str | None:
         severity=Severity.INFO,
         audience=Severity.INFO,
     )
-    try:
-        Channel(name, config.channel_url(name).get_secret_value()).send(alert)
-    except (DeliveryError, ConfigError) as problem:
-        return str(problem)
-    return None
 
 
 def _reached(config: Config, name: str) -> tuple[str, str | None]:

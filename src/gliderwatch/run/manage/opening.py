@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 from gliderwatch.config import Config
-from gliderwatch.errors import ConfigError
-from gliderwatch.store.database import current
+from gliderwatch.errors import ConfigError, StateError
+from gliderwatch.store.database import SCHEMA, read_only
 from gliderwatch.store.sqlite import Store
 
 
@@ -31,7 +31,13 @@ def writing(config: Config) -> Iterator[Store]:
     be of the release before.
     """
     path = Path(config.state.path)
-    current(path).close()
+    with closing(read_only(path)) as db:
+        version = int(db.execute("PRAGMA user_version").fetchone()[0])
+    if version < SCHEMA:
+        raise StateError(
+            f"state file {path} is of an earlier release (schema {version}, now {SCHEMA}). "
+            "What to do: systemctl restart gliderwatch, which takes it on"
+        )
     store = Store.open(path)
     try:
         with store.transaction():
