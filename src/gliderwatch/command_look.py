@@ -150,7 +150,10 @@ def status(config_path: Path, as_json: bool) -> None:
 @config_option
 @click.option("--channel", "only", help="Only this channel.")
 @click.option(
-    "--sample", type=click.Choice(SAMPLES), help="Send a whole message of this kind, marked as a sample."
+    "--sample",
+    type=click.Choice(SAMPLES),
+    metavar="KIND",
+    help=f"Send a whole message, marked as a sample: {', '.join(SAMPLES)}.",
 )
 def test_alert(config_path: Path, only: str | None, sample: str | None) -> None:
     """Send a test message to every channel, or to one.

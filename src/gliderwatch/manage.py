@@ -67,9 +67,7 @@ def unmute(config_path: Path, glider: str) -> None:
     click.echo("\n".join(manage.unmute(load(config_path), glider, time.time())))
 
 
-@click.command(
-    epilog=example("gliderwatch ack electa/anomaly/1667639520 --by Ann --note 'recovery on Monday'")
-)
+@click.command(epilog=example("gliderwatch ack electa/anomaly/1667639520 --by Ann"))
 @click.argument("incident")
 @click.option("--by", help="Who takes it on; else the user of this command.")
 @click.option("--note", default="", help="What the others should know.")
