@@ -117,13 +117,6 @@ def test_it_reaches_whoever_follows_any_of_them(fleet: Fleet) -> None:
     assert {tuple(row)[1] for row in rows} == {4} and len(rows) == len(shore.alerts)
 
 
-def test_one_glider_alone_is_told_as_ever(fleet: Fleet) -> None:
-    said = Shore().live(
-        of(fleet, before=SILENT) + of(fleet, after=SILENT, without="bruce"), SILENT + 5 * HOUR
-    )
-    assert all("shore side" not in a.title for a in said if a.glider == "bruce")
-
-
 def test_a_replay_says_the_same(fleet: Fleet) -> None:
     shore = Shore()
     shore.live(of(fleet), BACK)
