@@ -166,6 +166,7 @@ def test_run_check_and_doctor_refuse_the_same(site: Site, case: str) -> None:
     )
     assert doctored.returncode == (1 if is_here_only else 2)
     text = " ".join(doctored.stdout.split())
+    assert "could not be looked at" not in text
     assert f"{severity.upper()} " in text and words in text and f"line {line[1]}: {key}" in text
     assert TRACEBACK not in ran.stderr + checked.stderr + doctored.stderr
 

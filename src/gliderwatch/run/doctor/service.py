@@ -16,7 +16,7 @@ from gliderwatch.errors import ConfigError, DamagedError, StateError
 from gliderwatch.model import Alert, Kind, Severity
 from gliderwatch.run.doctor.finding import Finding, Findings, Level, error, note, ok, warning
 from gliderwatch.run.life import STALE, is_held, silence
-from gliderwatch.run.operator import failing, reading
+from gliderwatch.run.operator import Failing, failing, reading
 from gliderwatch.store.database import SCHEMA
 
 _START = "systemctl start gliderwatch; journalctl -u gliderwatch tells why it ended"
@@ -71,7 +71,7 @@ def channels(config: Config, problems: Iterable[Problem], send: bool) -> Finding
     yield from of_check("channels", problems, "channels", "recipients")
     urls = {name: f"channels.{name}.url: " for name in config.channels}
     bad = {name for name, key in urls.items() if any(p.text.startswith(key) for p in problems)}
-    waiting = failing(Path(config.state.path), time.time()) if Path(config.state.path).exists() else {}
+    waiting = _failing(Path(config.state.path))
     for name in config.channels:
         trouble = waiting.get(name)
         if name in bad:
@@ -88,6 +88,14 @@ def channels(config: Config, problems: Iterable[Problem], send: bool) -> Finding
             yield warning("channels", text, f"gliderwatch test-alert --channel {name}")
         else:
             yield ok("channels", f"{name} {said}")
+
+
+def _failing(path: Path) -> dict[str, Failing]:
+    """Channels that fail, as the state file tells; none where it cannot: `state` says why."""
+    try:
+        return failing(path, time.time()) if path.exists() else {}
+    except StateError:
+        return {}
 
 
 def sign(config: Config, problems: Iterable[Problem]) -> Findings:
