@@ -210,7 +210,8 @@ def test_bad_files_do_not_stop_the_others(mission: Path, tmp_path: Path) -> None
     assert counts(result.stdout) == {"taken": len(good), "quarantined": 6}
     for name in ("cut.sbd: cut or damaged", "empty.sbd: the file is empty", "text.sbd: not a Slocum data"):
         assert name in result.stdout
-    assert "2 files: not a regular file" in result.stdout and "broken-link.sbd" in result.stdout
+    for name in ("fifo.sbd", "broken-link.sbd"):
+        assert f"{name}: not a regular file" in result.stdout
     assert "utf8.sbd: its name is not UTF-8" in result.stdout
 
 
