@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from gliderwatch.config import Problem, check, load
+from gliderwatch.config import Problem, load
+from gliderwatch.run.preconditions import check
 
 TEXT = """\
 dockserver:
@@ -153,8 +154,9 @@ def test_state(found: Check, tree: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert is_one(found(TEXT.replace("state/s.sqlite", "state")), where + "state is a folder")
     assert is_one(found(TEXT.replace("state/s.sqlite", "gliders/s")), where + "lies below the root gliders")
 
-    monkeypatch.setattr("shutil.disk_usage", lambda _: Usage(1e9, 0.9e9, 0.1e9))
-    assert is_one(found(), "warning c.yml:6: state.path: less than 200 MB are free in")
+    with monkeypatch.context() as full:
+        full.setattr("shutil.disk_usage", lambda _: Usage(1e9, 0.9e9, 0.1e9))
+        assert is_one(found(), "warning c.yml:6: state.path: less than 200 MB are free in")
 
     real = os.access
     monkeypatch.setattr(os, "access", lambda path, mode: not mode & os.W_OK and real(path, mode))

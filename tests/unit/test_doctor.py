@@ -15,7 +15,7 @@ import pytest
 
 import dinkum
 from alert_support import alert
-from gliderwatch.config import check, load
+from gliderwatch.config import load
 from gliderwatch.ingest.scan import find_places, scan
 from gliderwatch.ingest.segment import SENSORS
 from gliderwatch.run import doctor
@@ -32,6 +32,7 @@ from gliderwatch.run.doctor.finding import (
     warning,
 )
 from gliderwatch.run.life import Life, alive_path
+from gliderwatch.run.preconditions import check
 from gliderwatch.store import outbox
 from gliderwatch.store.sqlite import Store
 
@@ -388,7 +389,7 @@ def test_a_state_file_that_is_damaged(examined: Doctor, tree: Path) -> None:
 
 def test_a_state_file_that_is_none(examined: Doctor, tree: Path) -> None:
     (tree / "state" / "s.sqlite").write_bytes(b"not a database" * 1000)
-    assert one([f for f in examined() if f.topic == "state"], Level.ERROR, "state", "not a database")
+    assert one([f for f in examined() if f.topic == "state"], Level.ERROR, "state", "a text file")
 
 
 def test_a_state_file_of_a_newer_gliderwatch(examined: Doctor, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -36,7 +36,8 @@ _Findings = Iterator[_Finding]
 
 
 def check(config: Config, path: Path) -> list[Problem]:
-    """Everything outside of the settings file ``path`` that is not as it says, with the line.
+    """Everything outside of the settings file ``path`` that is not as it says, with the line, but for what
+    the service does not start with (`run.preconditions`).
 
     What can be read depends on the user: run it as the user that runs the service.
     """
@@ -154,33 +155,19 @@ def _caches(config: Config) -> _Findings:
 
 
 def _state(config: Config) -> _Findings:
-    key, path = "state.path", Path(config.state.path)
+    path = Path(config.state.path)
     folder = next(parent for parent in path.parents if is_folder(parent))  # the daemon makes the rest
-    if is_folder(path):
-        yield _error(key, f"{path} is a folder", "name a file in it")
-    elif not os.access(folder, os.W_OK | os.X_OK) or (
-        os.access(path, os.F_OK) and not os.access(path, os.W_OK)
-    ):
-        yield _error(key, f"{path} cannot be written by this user", "chown it")
-    elif shutil.disk_usage(folder).free < _FREE_BYTES:
-        yield _warning(key, f"less than {_FREE_BYTES / 1e6:g} MB are free in {folder}", "make room")
-    for _, root in _folders("dockserver.roots", config.dockserver.roots):
-        if path.is_relative_to(root):
-            yield _error(key, f"lies below the root {root}", "put it elsewhere")
+    if shutil.disk_usage(folder).free < _FREE_BYTES:
+        yield _warning("state.path", f"less than {_FREE_BYTES / 1e6:g} MB are free in {folder}", "make room")
 
 
 def _channels(config: Config) -> _Findings:
     for name, channel in config.channels.items():
         key = f"channels.{name}.url"
-        template = channel.url.get_secret_value()
         try:
-            url = references.resolve(template, config.folder)
-        except ConfigError as error:
-            if references.needs_credentials(template) and references.CREDENTIALS not in os.environ:
-                yield _warning(key, str(error), "credentials are only there inside of the service")
-            else:
-                yield _error(key, str(error), "set it where the service gets it from")
-            continue
+            url = references.resolve(channel.url.get_secret_value(), config.folder)
+        except ConfigError:
+            continue  # the service does not start with it: see `run.preconditions`
         from gliderwatch.alerts.channels import problem  # noqa: PLC0415 (apprise behind it is slow to load)
 
         found = problem(url)

@@ -21,6 +21,12 @@ from gliderwatch.store.sqlite import File, Status, Store
 
 log = structlog.get_logger(__name__)
 
+CALM = 10.0
+"""Seconds without a further file after which it is said that an overdue glider calls again: of several that
+come at once only all together tell when it called."""
+LONGEST = 120.0
+"""Seconds after which that is said in any case."""
+
 
 class Reception:
     """Files that have settled come in, go through the decoder, and are taken into the store.
@@ -34,6 +40,7 @@ class Reception:
     ) -> None:
         self._store, self._upkeep, self._wake, self._is_stopping = store, upkeep, wake, is_stopping
         self._heeded = time.time()
+        self._calm: dict[str, tuple[float, float]] = {}
 
     def use(self, parts: Parts) -> None:
         """Work with these parts; comes before all else."""
@@ -73,6 +80,20 @@ class Reception:
         """Say what an earlier life left unsaid of any glider."""
         for glider in self._store.gliders():
             self._speak(glider)
+
+    def speak_when_calm(self, monotonic: float) -> float | None:
+        """Say what is to be said of gliders that were overdue and of which no file came for a while; seconds
+        until the next may be due, None: there is none."""
+        waiting = {g: at for g, (at, _) in self._calm.items() if not self._parts.backlog.more(g)}
+        for glider in [g for g, at in waiting.items() if at <= monotonic]:
+            del self._calm[glider], waiting[glider]
+            if self._is_known(glider):
+                self._say(glider)
+        return min(waiting.values()) - monotonic if waiting else None
+
+    def is_calm(self, glider: str) -> bool:
+        """Whether nothing of a glider waits to be said."""
+        return glider not in self._calm
 
     def heed_mutes(self, now: float) -> None:
         """Say what there is to say of gliders whose mute has ended since the last time, by `now` (s)."""
@@ -139,16 +160,30 @@ class Reception:
         self._told(intake.note(self._store, file, params, speaking, time.time()))
 
     def _speaking(self, glider: str) -> Speaking | None:
-        """Who is told of a glider; None while more of its files are at hand: the last speaks for all."""
+        """Who is told of a glider; None while more of its files are at hand, or may be: the last speaks for
+        all."""
         last = self._is_known(glider) and not self._parts.backlog.more(glider)
-        return self._parts.speaking if last else None
+        return self._parts.speaking if last and not self._may_more_come(glider) else None
+
+    def _may_more_come(self, glider: str) -> bool:
+        """Whether it was told to be overdue: then a file may be the first of several that come at once."""
+        now, waiting = time.monotonic(), self._calm.get(glider)
+        if waiting is None:
+            silences = self._store.said(glider).silences
+            if not any(s.called is None and s.messages for s in silences):
+                return False
+        end = now + LONGEST if waiting is None else waiting[1]
+        self._calm[glider] = min(now + CALM, end), end
+        return True
 
     def _speak(self, glider: str) -> None:
         """Say what is to be said of a glider without a new file."""
-        speaking = self._speaking(glider)
-        if speaking is not None:
-            params = self._parts.config.glider(glider)
-            self.alerted(intake.speak(self._store, glider, params, speaking, time.time()))
+        if self._speaking(glider) is not None:
+            self._say(glider)
+
+    def _say(self, glider: str) -> None:
+        params = self._parts.config.glider(glider)
+        self.alerted(intake.speak(self._store, glider, params, self._parts.speaking, time.time()))
 
     def _told(self, taken: intake.Taken, seconds: float | None = None) -> None:
         logs.taken(taken)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import tempfile
 import threading
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -30,12 +29,15 @@ from gliderwatch.run.lines import alert_line, assessment_line, write_lines
 from gliderwatch.run.ocean import Ocean
 from gliderwatch.run.speaking import NOBODY, speaking
 from gliderwatch.run.turns import Turns
-from gliderwatch.store.database import MEMORY
+from gliderwatch.store.database import MEMORY, refuse_foreign
 from gliderwatch.store.outbox import Outbox
 from gliderwatch.store.sqlite import Status, Store
 
 STATE = "replay.sqlite"
 """Name of the state file in the folder of results: another one than a daemon's usual."""
+ASSESSMENTS, ALERTS = "assessments.jsonl", "alerts.jsonl"
+WRITTEN = (ASSESSMENTS, ALERTS, STATE)
+"""All that is left in the folder of results."""
 SEND_PATIENCE = 120.0
 """Seconds that `--send` waits at the end for messages to be delivered."""
 
@@ -67,7 +69,8 @@ class Request:
 class Report:
     """What a replay found: files by status with reasons, and the store that holds the rest.
 
-    ``clock`` is what time it is for each glider (s): that of its data.
+    ``clock`` is what time it is for each glider (s): that of its data. ``coming`` is when its files were
+    opened that are not taken yet (s).
     """
 
     store: Store
@@ -75,6 +78,7 @@ class Report:
     files: Counter[Status] = field(default_factory=Counter)
     undelivered: int = 0
     clock: dict[str, float] = field(default_factory=dict)
+    coming: dict[str, deque[float]] = field(default_factory=dict)
 
 
 def replay(
@@ -97,6 +101,8 @@ def replay(
         with _speaking(request, path, report) as told:
             jobs = _triage(files, report, caches, request, on_file)
             _check_glider(request, jobs, report.store)
+            for job in jobs:
+                report.coming.setdefault(job.header.id.glider, deque()).append(job.header.id.opened_at)
             turns = Turns(jobs)
             for decoded in _decoded(jobs, caches, workers):
                 for job, sent in turns.after(decoded):
@@ -107,12 +113,16 @@ def replay(
 
 
 def find_files(folders: Iterable[Path]) -> list[Path]:
-    """All flight data files below some folders, each once; links are followed, for who replays chose them."""
+    """All flight data files below some folders, each once.
+
+    The folders may be links. Below them a link is treated as the service does: a file that is one is named
+    and left alone, a folder that is one is not looked into.
+    """
     found = {
-        path.resolve() if path.is_symlink() else path: None
+        path: None
         for folder in folders
         for path in sorted([folder] if folder.is_file() else folder.rglob("*"))
-        if names.kind(path.name) is not None and not path.is_dir()
+        if names.kind(path.name) is not None and (path.is_symlink() or not path.is_dir())
     }
     return list(found)
 
@@ -148,6 +158,7 @@ def _fresh(path: Path, config: Config | None) -> Path:
     """A state file of which nothing is there: what an earlier replay left is removed."""
     if alive_path(path).exists() or (config is not None and path.resolve() == Path(config.state.path)):
         raise GliderwatchError(f"{path} is the state of a daemon: choose another folder for --out")
+    refuse_foreign(path, "Choose another folder for --out")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         for old in (path, *path.parent.glob(f"{path.name}-*")):
@@ -240,7 +251,7 @@ def _take(
 ) -> None:
     """Let the clock run until a file was `sent` (s), and take it."""
     glider = job.header.id.glider
-    params, ticked = request.params(glider), _tick(glider, report, told, sent)
+    params, ticked = request.params(glider), _tick(report, told, sent)
     try:
         if not isinstance(job.result, Segment):
             raise job.result if job.result is not None else Retry("was not decoded")
@@ -248,24 +259,34 @@ def _take(
         taken = intake.take(report.store, job.file, job.result, params, told, sent, ocean=ocean)
     except (Quarantine, Retry) as error:
         taken = intake.note(report.store, arrivals.failed(job.file, error), params, told, sent)
+    report.coming[glider].popleft()
+    report.clock[glider] = max(sent, report.clock.get(glider, sent))
     _count(replace(taken, alerts=(*ticked, *taken.alerts)), report, on_file)
 
 
-def _tick(glider: str, report: Report, told: Speaking, until: float) -> list[Alert]:
-    """What a daemon would have said of a glider's silence until a time (s).
+def _tick(report: Report, told: Speaking, until: float) -> list[Alert]:
+    """What a daemon would have said of the silence of all gliders until a time (s), in its order.
 
-    Nothing between two deployments: a replay knows that the first one has ended.
+    Nothing between two deployments, nor after the last file: a replay knows that a deployment has ended.
     """
     store, alerts = report.store, list[Alert]()
-    others = [other for other in store.gliders() if other != glider and not told.attention(other).recovered]
-    now = last = report.clock.get(glider, -math.inf)
-    at = intake.next_tick(store, glider, told, now) if until - now < GONE else None
-    while at is not None and last < at <= until:
-        alerts += intake.tick(store, glider, told, others, at)
-        last = at
-        at = intake.next_tick(store, glider, told, at)
-    report.clock[glider] = max(until, now)
-    return alerts
+    while True:
+        due = {g: t for g in report.clock if (t := _due(g, report, told, until)) is not None}
+        if not due:
+            return alerts
+        glider = min(due, key=lambda g: (due[g], g))
+        others = [g for g in store.gliders() if g != glider and not told.attention(g).recovered]
+        alerts += intake.tick(store, glider, told, others, due[glider])
+        report.clock[glider] = due[glider]
+
+
+def _due(glider: str, report: Report, told: Speaking, until: float) -> float | None:
+    """When there is something to say next of a glider's silence, if that is before `until` (s)."""
+    now, coming = report.clock[glider], report.coming[glider]
+    if not coming or coming[0] - now >= GONE:
+        return None
+    at = intake.next_tick(report.store, glider, told, now)
+    return at if at is not None and now < at <= until else None
 
 
 def _count(taken: intake.Taken, report: Report, on_file: Callable[[intake.Taken], None]) -> None:
@@ -275,5 +296,5 @@ def _count(taken: intake.Taken, report: Report, on_file: Callable[[intake.Taken]
 
 def _write(out: Path, store: Store) -> None:
     assessments = (assessment_line(a) for glider in store.gliders() for a in store.assessments(glider))
-    write_lines(out / "assessments.jsonl", assessments)
-    write_lines(out / "alerts.jsonl", (alert_line(a) for a in store.alerts()))
+    write_lines(out / ASSESSMENTS, assessments)
+    write_lines(out / ALERTS, (alert_line(a) for a in store.alerts()))

@@ -93,23 +93,25 @@ class Overview:
 
 
 def overview(config: Config) -> Overview:
-    """Look into the state file of a configuration. Raises StateError where there is none."""
+    """Look into the state file of a configuration. Raises StateError where there is none, or one that the
+    service has to migrate first."""
     path = Path(config.state.path)
     store, now = Store.reading(path), time.time()
     try:
-        waiting = store.undelivered()
-        names = sorted({*config.gliders, *store.gliders()})
-        return Overview(
-            running=is_held(path),
-            silent_for=silence(path),
-            gliders=tuple(_glider(store, name, config, now) for name in names),
-            files=store.counts(),
-            waiting=tuple(store.files(Status.WAITING)),
-            quarantined=tuple(store.files(Status.QUARANTINED)),
-            unknown=tuple(store.files(Status.UNKNOWN)),
-            undelivered=(*(u for u in waiting if u.held_until <= now), *store.refused(now - WEEK)),
-            held=tuple(u for u in waiting if u.held_until > now),
-        )
+        with store.guarded():
+            waiting = store.undelivered()
+            names = sorted({*config.gliders, *store.gliders()})
+            return Overview(
+                running=is_held(path),
+                silent_for=silence(path),
+                gliders=tuple(_glider(store, name, config, now) for name in names),
+                files=store.counts(),
+                waiting=tuple(store.files(Status.WAITING)),
+                quarantined=tuple(store.files(Status.QUARANTINED)),
+                unknown=tuple(store.files(Status.UNKNOWN)),
+                undelivered=(*(u for u in waiting if u.held_until <= now), *store.refused(now - WEEK)),
+                held=tuple(u for u in waiting if u.held_until > now),
+            )
     finally:
         store.close()
 

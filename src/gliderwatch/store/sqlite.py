@@ -42,6 +42,11 @@ class Store:
         """The store at a path, for looking only. Raises StateError where there is none."""
         return cls(read_only(path), path)
 
+    @property
+    def folder(self) -> Path | None:
+        """The folder of the state file; None of one in memory."""
+        return None if self._path == MEMORY else Path(self._path).parent
+
     def close(self) -> None:
         """Give the connection back."""
         self._db.close()
