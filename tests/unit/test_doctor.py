@@ -62,7 +62,7 @@ def put(
 ) -> Path:
     """A file of electa, and its cache file; without some sensors."""
     sensors = tuple(s for s in SENSORS_OF_ALL if s[0] not in lacking)
-    (tree / "cache" / f"{crc}.cac").write_bytes(dinkum.sensor_list(sensors))
+    (tree / "cache" / f"{crc}.cac").write_bytes(dinkum.sensor_list(sensors, crc))
     path = tree / "gliders" / "electa" / "from-glider" / f"{name}.sbd"
     path.write_bytes(dinkum.header(name, crc=crc, n_held=len(sensors), **tags))
     return path

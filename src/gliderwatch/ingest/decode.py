@@ -31,7 +31,7 @@ from pebble import ProcessExpired, ProcessPool
 
 from gliderwatch.errors import GliderwatchError, Quarantine, Retry
 from gliderwatch.ingest import names
-from gliderwatch.ingest.caches import Staging
+from gliderwatch.ingest.caches import Staging, checksum
 from gliderwatch.ingest.cycles import Sensors, intact, parse_sensor_list
 from gliderwatch.ingest.header import Header, parse_header, plain, read_regular
 from gliderwatch.ingest.scratch import Scratch
@@ -67,6 +67,8 @@ def _own_list(data: bytes, header: Header) -> tuple[Sensors, int]:
         sensors, start = parse_sensor_list(data, header.length, header.n_sensors)
     except ValueError as error:
         raise Quarantine(f"cut or damaged in its sensor list: {error}") from error
+    if int(checksum(data[header.length : start]), 16) != int(header.crc, 16):
+        raise Quarantine("damaged in its sensor list: it has not the checksum that the header says")
     if len(sensors.names) != header.n_held:
         raise Quarantine("damaged: header and sensor list hold different numbers of sensors")
     return sensors, start

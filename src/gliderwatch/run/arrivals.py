@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from gliderwatch.errors import MissingCache, Quarantine, Retry
-from gliderwatch.ingest.caches import find_cache
+from gliderwatch.ingest.caches import is_there
 from gliderwatch.ingest.header import read_header
 from gliderwatch.ingest.settle import Settling
 from gliderwatch.run.backlog import Job
@@ -111,7 +111,7 @@ def _gone(before: File | None, store: Store, is_known: Callable[[str], bool]) ->
 def _is_missing(crc: str, caches: Sequence[Path]) -> bool:
     """Whether a cache file is in none of the folders; where one cannot be read, the decoder tells why."""
     try:
-        return find_cache(crc, caches) is None
+        return not is_there(crc, caches)
     except OSError:
         return False
 

@@ -208,7 +208,7 @@ class Daemon:
     def _retry_waiting(self) -> None:
         """Look again at the files that wait; one that has changed since has to settle first."""
         self._retry = False
-        self._parts.decoder.cache_folders = self._parts.watcher.cache_folders()
+        self._parts.decoder.cache_folders = self._parts.cache_folders()
         for file in self._store.files(Status.WAITING, Status.UNKNOWN):
             path = Path(file.path)
             if arrivals.state(path) in (None, (file.size, file.mtime_ns)):

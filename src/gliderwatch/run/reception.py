@@ -11,6 +11,7 @@ from pathlib import Path
 import structlog
 
 from gliderwatch.errors import Quarantine, StateError
+from gliderwatch.ingest.watch import CacheChanged
 from gliderwatch.model import Alert, Segment
 from gliderwatch.run import arrivals, intake, logs
 from gliderwatch.run.backlog import Job
@@ -44,12 +45,24 @@ class Reception:
         caches = self._parts.decoder.cache_folders
         found = arrivals.judge(path, self._store, caches, self._is_known)
         if isinstance(found, Job):
+            self._keep_list(path, found)
             self._upkeep.queued(found)
             self._parts.backlog.add(found)
         elif found is not None:
             self._note(found)
         if arrivals.state(path) is None:  # it may come back as it was: a share that was away
             self._parts.settling.forget(path)
+
+    def _keep_list(self, path: Path, job: Job) -> None:
+        """Keep the sensor list that a file holds: others that left it out may wait for it."""
+        try:
+            kept = self._parts.lists.keep(path, job.header)
+        except OSError as error:
+            log.warning("sensor list cannot be kept", path=str(path), crc=job.header.crc, reason=str(error))
+            return
+        if kept is not None:
+            log.info("sensor list kept", path=str(path), crc=job.header.crc)
+            self._parts.news.put(CacheChanged(kept))
 
     def decoded(self, news: Decoded) -> None:
         """Take the files of a glider that are decoded, in their order.
