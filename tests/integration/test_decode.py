@@ -201,7 +201,7 @@ def test_each_cache_file_that_cannot_be_used_is_named_with_what_is_wrong(station
 
 
 @pytest.mark.parametrize("change", [b"\r\n", b"\n"], ids=["CRLF", "LF"])
-@pytest.mark.parametrize("padding", [b"", b"\r\n", b"\x1a" * 100, b"\0" * 20])
+@pytest.mark.parametrize("padding", [b"", b"\r\n", b"\x1a" * 100, b"\0" * 20], ids=["", "line", "^Z", "0"])
 def test_line_ends_and_padding_of_a_transfer_are_no_other_list(station, change, padding):
     path, cache = station
     expected = decode(path, [cache])

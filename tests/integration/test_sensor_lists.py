@@ -1,4 +1,4 @@
-"""Sensor lists: their checksum in real files, and those of whole files kept for the ones that leave them out."""
+"""Sensor lists: their checksum in real files; those inside of files, kept for others."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_the_list_of_a_whole_file_is_kept_once(lists: SensorLists, tmp_path: Pat
     assert kept == tmp_path / "state.sqlite.lists" / f"{dinkum.CRC}.cac"
     assert kept.read_bytes() == dinkum.sensor_list()
     assert lists.keep(path, read_header(path)) is None
-    assert os.listdir(lists.folder) == [kept.name]
+    assert list(lists.folder.iterdir()) == [kept]
 
 
 @pytest.mark.parametrize(
@@ -91,4 +91,8 @@ def test_no_more_lists_are_kept_than_have_room(
         kept = lists.keep(path, read_header(path))
         assert kept is not None
         os.utime(kept, ns=(i, i))
-    assert sorted(os.listdir(lists.folder)) == ["00000003.cac", "00000004.cac", "00000005.cac"]
+    assert sorted(path.name for path in lists.folder.iterdir()) == [
+        "00000003.cac",
+        "00000004.cac",
+        "00000005.cac",
+    ]

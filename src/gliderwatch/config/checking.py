@@ -14,13 +14,13 @@ from gliderwatch.config.paths import FROM_GLIDER, expand, is_folder
 from gliderwatch.config.problem import Problem
 from gliderwatch.config.root import Config
 from gliderwatch.errors import ConfigError
-from gliderwatch.ingest.scan import IGNORED
+from gliderwatch.ingest.scan import is_left_out
 
 _CACHES = {".cac", ".ccc"}
 _FREE_BYTES = 200e6
 _DEEPEST = 6
 """Folders between a root and `from-glider`, as many as the scan goes through."""
-_NOT_OURS = {*IGNORED, "lost+found"}
+_NOT_OURS = "lost+found"
 _LET_READ = "chmod or setfacl, or add this user to the group of the folder"
 
 
@@ -109,7 +109,7 @@ class _Found:
             self.gliders.setdefault(folder.name.lower(), []).append(folder / FROM_GLIDER)
         elif depth < _DEEPEST:
             for name in inside:
-                if name.lower() not in _NOT_OURS:
+                if name != _NOT_OURS and not is_left_out(name):
                     self.search(folder / name, depth + 1)
 
 

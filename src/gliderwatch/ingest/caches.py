@@ -80,8 +80,8 @@ class Staging:
     def get(self, header: Header, folders: Iterable[Path]) -> Staged:
         """The sensor list of a file with this header: the first that is whole and the right one.
 
-        Raises `MissingCache` where none of `folders` has it, `Retry` where what they have cannot be used, with
-        what is wrong with each.
+        Raises `MissingCache` where none of `folders` has it, `Retry` where what they have cannot be used,
+        with what is wrong with each.
         """
         wrong: list[str] = []
         try:

@@ -12,8 +12,21 @@ _RANKS = {"sbd": 0, "mbd": 1, "dbd": 2}
 _SEGMENT = re.compile(r"(?P<glider>.+)-\d{4}-\d{1,3}-\d{1,5}-\d{1,5}", re.ASCII | re.DOTALL)
 
 
+_UNDER_WAY = re.compile(r"[.~].*|.*(~|\.(tmp|temp|part|partial|filepart)(\..*)?)", re.IGNORECASE | re.DOTALL)
+"""Names that programs give a file until all of it is there (rsync, WinSCP, browsers, `deliver`)."""
+
+
+def is_under_way(name: str) -> bool:
+    """Whether the name is that of a transfer under way, or of one that was given up: never of data.
+
+    >>> is_under_way(".electa-2022-308-3-2.sbd"), is_under_way("00920000.tmp.sbd"), is_under_way("00920000.sbd")
+    (True, True, False)
+    """
+    return _UNDER_WAY.fullmatch(name) is not None
+
+
 def _suffix(name: str) -> str:
-    return PurePath(name).suffix[1:].lower()
+    return "" if is_under_way(name) else PurePath(name).suffix[1:].lower()
 
 
 def kind(name: str) -> str | None:

@@ -224,9 +224,7 @@ def _triage(
     return sorted(jobs, key=lambda j: (j.header.id, -names.rank(j.header.kind), j.file.path))
 
 
-def _note(
-    file: File, report: Report, request: Request, on_file: Callable[[intake.Taken], None]
-) -> None:
+def _note(file: File, report: Report, request: Request, on_file: Callable[[intake.Taken], None]) -> None:
     """Write down a file that is not decoded."""
     if file.status == Status.UNKNOWN and request.glider is not None:
         file = replace(file, reason=f"of {file.glider}, not of {request.glider}")
