@@ -258,7 +258,7 @@ def test_files_that_are_no_use_are_named(examined: Doctor, tree: Path) -> None:
         (("m_gps_lon",), Level.ERROR, ("m_gps_lon", "nothing can be assessed")),
         (("m_water_vx", "m_water_vy"), Level.WARNING, ("m_water_vx or m_initial_water_vx", "flag 2")),
         (("m_water_vy",), Level.WARNING, ("m_water_vy or m_initial_water_vy (no current", "flag 2")),
-        (("m_depth",), Level.WARNING, ("m_depth (drift is told from flight by pitch alone",)),
+        (("m_depth",), Level.WARNING, ("m_depth or m_pressure (drift is told",)),
         (("m_pitch",), Level.WARNING, ("m_pitch (no asymmetry",)),
         (("m_roll",), Level.WARNING, ("m_roll (no sign of a lost wing",)),
         (("m_lon",), Level.NOTE, ("m_lon (the way of a dive",)),

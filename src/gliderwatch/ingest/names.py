@@ -19,7 +19,7 @@ _UNDER_WAY = re.compile(r"[.~].*|.*(~|\.(tmp|temp|part|partial|filepart)(\..*)?)
 def is_under_way(name: str) -> bool:
     """Whether the name is that of a transfer under way, or of one that was given up: never of data.
 
-    >>> is_under_way(".electa-2022-308-3-2.sbd"), is_under_way("00920000.tmp.sbd"), is_under_way("00920000.sbd")
+    >>> is_under_way(".electa-2022-308-3-2.sbd"), is_under_way("92.tmp.sbd"), is_under_way("92.sbd")
     (True, True, False)
     """
     return _UNDER_WAY.fullmatch(name) is not None

@@ -40,7 +40,7 @@ WANTED = {
     ("m_heading",): "the commanded heading stands in; a compass fault goes unseen",
     ("m_water_vx", "m_initial_water_vx"): _NO_CURRENT,
     ("m_water_vy", "m_initial_water_vy"): _NO_CURRENT,
-    ("m_depth",): "drift is told from flight by pitch alone; no rate of dive and climb",
+    ("m_depth", "m_pressure"): "drift is told from flight by pitch alone; no rate of dive and climb",
     ("m_pitch",): "no asymmetry of dive and climb; drift is told by depth alone",
     ("m_roll",): "no sign of a lost wing or of what hangs on one side",
 }
