@@ -105,7 +105,7 @@ def test_folders_that_cannot_be_read(found: Check, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(os, "access", access)
     glider, cache = found()
     assert glider.startswith(
-        "error c.yml:8: gliders.electa: gliders/Electa/from-glider cannot be read (chmod"
+        "error c.yml:8: gliders.electa: gliders/Electa/from-glider cannot be read (let this"
     )
     assert cache.startswith("error c.yml:5: dockserver.cache.0: cache cannot be read (chmod")
 

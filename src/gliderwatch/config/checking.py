@@ -21,7 +21,7 @@ _FREE_BYTES = 200e6
 _DEEPEST = 6
 """Folders between a root and `from-glider`, as many as the scan goes through."""
 _NOT_OURS = "lost+found"
-_LET_READ = "chmod or setfacl, or add this user to the group of the folder"
+_LET_READ = "let this user read it: gliderwatch doctor says by which mode, group or ACL"
 
 
 @dataclass(frozen=True, slots=True)
