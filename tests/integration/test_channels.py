@@ -454,6 +454,8 @@ class TestUrls:
             f"mailto://watch:{PASSWORD}@example.org?from=not an address&to=pilot@example.org&mode=what",
             f"mailto://watch:{PASSWORD}@example.org?to=no-address",
             "mailto://",
+            "mailto://localhost",
+            "mailto://127.0.0.1:25?smtp=localhost&cc=pilot@example.org",
         ],
     )
     def test_bad_ones_say_so_without_their_secrets(self, url: str) -> None:

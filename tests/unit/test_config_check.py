@@ -107,7 +107,7 @@ def test_folders_that_cannot_be_read(found: Check, monkeypatch: pytest.MonkeyPat
     assert glider.startswith(
         "error c.yml:8: gliders.electa: gliders/Electa/from-glider cannot be read (let this"
     )
-    assert cache.startswith("error c.yml:5: dockserver.cache.0: cache cannot be read (chmod")
+    assert cache.startswith("error c.yml:5: dockserver.cache.0: cache cannot be read (let this")
 
 
 def test_configured_glider_without_folder_is_a_warning(found: Check) -> None:
