@@ -98,6 +98,9 @@ def status(view: Overview, console: Console) -> None:
             taken_on = "" if ack is None else f", {acknowledged(ack, i)}"
             console.print(Text(text + taken_on, style=_STYLES[i.severity]))
     files(view.files, [*view.waiting, *view.quarantined], console)
+    for name, link in view.links.items():
+        text = f"{clean(name, 30)}: {clean(str(link), 600)} ({clean(link.cure, 600)})"
+        console.print(Text(text, style="bold red"), soft_wrap=True)
     if view.unknown:
         names = ", ".join(clean(g) for g in sorted({f.glider for f in view.unknown}))
         console.print(
