@@ -119,8 +119,8 @@ def test_a_glider_whose_folder_is_a_link_is_named_with_the_cure(found: Check, tr
     (tree / link).symlink_to(target if link.endswith("from-glider") else target.parent)
     text = TEXT.replace("  electa:\n", "  electa:\n  george:\n")
     assert found(text) == [
-        f"error c.yml:9: gliders.george: {link} is a symbolic link, and links are not followed: its files are "
-        "not seen (write `paths: [disk2/george/from-glider]` below the glider)"
+        f"error c.yml:9: gliders.george: {link} is a symbolic link, and links are not followed: its files "
+        "are not seen (write `paths: [disk2/george/from-glider]` below the glider)"
     ]
     path = tree / "c.yml"
     path.write_text(text, encoding="utf-8")
