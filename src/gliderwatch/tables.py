@@ -70,7 +70,9 @@ def files(counts: dict[Status, int], left_out: Sequence[File], console: Console,
     """What became of files: how many of each status, and why those that were not taken were not."""
     console.print("files: " + (", ".join(f"{n} {status}" for status, n in counts.items()) or "none"))
     for file in left_out[:most]:
-        console.print(Text(f"  {file.status}  {clean(file.path, 500)}: {clean(file.reason)}"), soft_wrap=True)
+        console.print(
+            Text(f"  {file.status}  {clean(file.path, 500)}: {clean(file.reason, 2000)}"), soft_wrap=True
+        )
     if len(left_out) > most:
         console.print(f"  and {len(left_out) - most} more")
 
