@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import json
 import shutil
+from contextlib import closing
 from pathlib import Path
 
+import dinkum
 from acceptance.angus import FILES, MISSION, put, taken
 from acceptance.support import Daemon, Site, command, until
 from acceptance.test_replay import counts
+from gliderwatch.model import SegmentId
 from gliderwatch.simulate.dockserver import FileForm, arrivals
-from gliderwatch.store.sqlite import Status
+from gliderwatch.store.sqlite import Status, Store
+from integration.test_science import NAME, NO_DEPTH, OTHER, SCIENCE, flight, science
 
 WHOLE = list(arrivals(MISSION, FileForm(factored=False)))
 WAITING = Status.WAITING
@@ -87,3 +91,26 @@ def test_a_replay_names_the_cache_file_that_is_another(site: Site, tmp_path: Pat
     run = command("run", "--replay", folder)
     assert counts(run.stdout + run.stderr) == {"waiting": 1}
     assert "cannot be used: it is cut or changed" in " ".join((run.stdout + run.stderr).split())
+
+
+def test_the_science_file_that_comes_after_its_flight_file_gives_the_depth(site: Site) -> None:
+    site.configure("unit_7")
+    site.cache.joinpath(f"{dinkum.CRC}.cac").write_bytes(dinkum.sensor_list(NO_DEPTH))
+    site.cache.joinpath(f"{OTHER}.cac").write_bytes(dinkum.sensor_list(SCIENCE, OTHER))
+    identity = SegmentId(dinkum.OPENED_AT, "unit_7", NAME)
+
+    def depths() -> int:
+        with closing(Store.reading(site.state)) as store:
+            return len(store.segments.get(identity).get("depth"))
+
+    with Daemon(site) as daemon:
+        site.put("unit_7", f"{NAME}.sbd", flight())
+        until(lambda: site.statuses(f"{NAME}.sbd") == [Status.TAKEN], "taken")
+        assert depths() == 0
+        site.put("unit_7", f"{NAME}.tbd", science())
+        until(lambda: depths() > 30, "the depth is there")
+        site.put("unit_7", f"{NAME}.tcd", b"no data")  # looked at, and of no use
+        site.put("unit_7", "unit_7-2024-250-1-4.sbd", b"no data")
+        until(lambda: site.statuses("unit_7-2024-250-1-4.sbd") == [Status.QUARANTINED], "gone on")
+        assert site.statuses(f"{NAME}.sbd") == [Status.TAKEN]
+        assert len(daemon.log("file taken")) == 2

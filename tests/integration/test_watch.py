@@ -11,7 +11,7 @@ from queue import Empty, Queue
 import pytest
 
 from gliderwatch.ingest.scan import Place, expand, scan
-from gliderwatch.ingest.watch import CacheChanged, Change, FileChanged, TreeChanged, Watcher
+from gliderwatch.ingest.watch import CacheChanged, Change, FileChanged, ScienceChanged, TreeChanged, Watcher
 
 LONG = "electa-2022-308-3-2.sbd"
 SHORT = "00930002.sbd"
@@ -174,7 +174,15 @@ def test_other_files_and_folders_are_no_news(watch, dock):
         dock.cache / "notes.txt",
     ):
         path.write_bytes(b"data")
-    assert [change for change in drain(queue) if not isinstance(change, TreeChanged)] == []
+    told = [change for change in drain(queue) if not isinstance(change, TreeChanged)]
+    assert set(told) <= {ScienceChanged(dock.inbox / "00930002.tbd")}
+
+
+def test_a_science_file_is_news_for_the_flight_file_beside_it(watch, dock):
+    _, queue = watch()
+    drain(queue)
+    dock.move_in(dock.inbox / "00930002.TCD")
+    assert ScienceChanged(dock.inbox / "00930002.TCD") in drain(queue)
 
 
 def test_a_glider_that_appears_is_watched_at_once(watch, dock):

@@ -161,11 +161,15 @@ def decompress(data: bytes, limit: int) -> bytes:
     return b"".join(parts)
 
 
-def parse_header(data: bytes) -> Header:
-    """The header at the start of `data`, what `plain` gives. Raises `Quarantine` with the reason in words."""
+def parse_header(data: bytes, *, science: bool = False) -> Header:
+    """The header at the start of `data`, what `plain` gives, of a flight file or of one of `science`.
+
+    Raises `Quarantine` with the reason in words.
+    """
     tags, length = _tags(data)
-    kind = names.kind(f"x.{tags['filename_extension']}")
-    if kind is None:
+    name = f"x.{tags['filename_extension']}"
+    kind = names.kind(name) if not science else "".join(names.flight_of(name)[:1])
+    if not kind:
         raise Quarantine(f"holds {tags['filename_extension']} data, not flight data (sbd, mbd, dbd)")
     full_name = tags["full_filename"]
     glider = names.glider_of(full_name)

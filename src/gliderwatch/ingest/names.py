@@ -7,6 +7,8 @@ from pathlib import PurePath
 
 _FLIGHT = {"sbd": "sbd", "mbd": "mbd", "dbd": "dbd", "scd": "sbd", "mcd": "mbd", "dcd": "dbd"}
 _SCIENCE = frozenset({"tbd", "nbd", "ebd", "tcd", "ncd", "ecd"})
+_SCIENCE_OF = {"sbd": ("tbd", "tcd"), "mbd": ("nbd", "ncd"), "dbd": ("ebd", "ecd")}
+_FLIGHT_OF = {"tbd": ("sbd", "scd"), "nbd": ("mbd", "mcd"), "ebd": ("dbd", "dcd")}
 _CACHE = frozenset({"cac", "ccc"})
 _RANKS = {"sbd": 0, "mbd": 1, "dbd": 2}
 _SEGMENT = re.compile(r"(?P<glider>.+)-\d{4}-\d{1,3}-\d{1,5}-\d{1,5}", re.ASCII | re.DOTALL)
@@ -41,6 +43,24 @@ def kind(name: str) -> str | None:
 def is_science(name: str) -> bool:
     """Whether the name is that of science data (tbd, ebd, ...), known but not used."""
     return _suffix(name) in _SCIENCE
+
+
+def science_of(name: str) -> tuple[str, ...]:
+    """The suffixes of the science files that belong to a flight file of this name; none for others.
+
+    >>> science_of("00920000.SCD"), science_of("00920000.tbd")
+    (('tbd', 'tcd'), ())
+    """
+    return _SCIENCE_OF.get(kind(name) or "", ())
+
+
+def flight_of(name: str) -> tuple[str, ...]:
+    """The suffixes of the flight files that belong to a science file of this name; none for others.
+
+    >>> flight_of("00920000.tcd"), flight_of("00920000.sbd")
+    (('sbd', 'scd'), ())
+    """
+    return _FLIGHT_OF.get(_suffix(name).replace("c", "b"), ())
 
 
 def is_cache(name: str) -> bool:

@@ -21,7 +21,9 @@ from gliderwatch.ingest.header import Header
 from gliderwatch.model import Array, Segment, Series, readonly
 
 TIME = "m_present_time"
-DEPTH, PRESSURE = "m_depth", "m_pressure"
+DEPTH = "m_depth"
+PRESSURES = ("m_pressure", "sci_water_pressure")
+"""Bar, above that of the air; the first that a file has stands in for a depth that is missing."""
 _NO_FIX = 69696969.0
 _POSITION = "DDMM.mmmm"
 _UNITS = {
@@ -121,7 +123,7 @@ QUANTITIES = (
     _q("leak_voltage_forward", "m_leakdetect_voltage_forward", "volts", 0, 5, "leak detector, forward"),
     _q("leak_voltage_science", "m_leakdetect_voltage_science", "volts", 0, 5, "leak detector, science bay"),
 )
-SENSORS = (TIME, PRESSURE, *(sensor for quantity in QUANTITIES for sensor in quantity.sensors))
+SENSORS = (TIME, *PRESSURES, *(sensor for quantity in QUANTITIES for sensor in quantity.sensors))
 """All Slocum sensors that are read where a file has them."""
 
 _GROUPS = tuple(
@@ -171,10 +173,19 @@ def build_segment(
 
 def _with_depth(samples: Samples) -> Samples:
     """The samples; with the depth that the pressure says where there is none."""
-    if (DEPTH in samples and len(samples[DEPTH][0])) or PRESSURE not in samples:
+    t, bar = next((samples[name] for name in PRESSURES if _holds(samples, name)), (None, None))
+    if _holds(samples, DEPTH) or t is None or bar is None:
         return samples
-    t, bar = samples[PRESSURE]
     return {**samples, DEPTH: (t, depth_of(bar))}
+
+
+def tells_depth(samples: Samples) -> bool:
+    """Whether there is a value of the depth, or of a pressure that stands in for it."""
+    return any(_holds(samples, name) for name in (DEPTH, *PRESSURES))
+
+
+def _holds(samples: Samples, name: str) -> bool:
+    return name in samples and len(samples[name][0]) > 0
 
 
 def depth_of(bar: Array) -> Array:

@@ -7,8 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from gliderwatch.errors import MissingCache, Quarantine, Retry
-from gliderwatch.ingest.caches import is_there
+from gliderwatch.ingest.caches import Staging, is_there
 from gliderwatch.ingest.header import read_header
+from gliderwatch.ingest.science import needs_science
 from gliderwatch.ingest.settle import Settling
 from gliderwatch.run.backlog import Job
 from gliderwatch.store.sqlite import File, Status, Store
@@ -45,17 +46,34 @@ def settle_anew(path: Path, settling: Settling, now: float) -> None:
     observe(path, settling, now)
 
 
+def lacks_depth(flight: Path, store: Store, caches: Sequence[Path], staging: Staging) -> bool:
+    """Whether a flight file that was looked at before, and is as it was, names no sensor of the depth."""
+    before = store.file(_text(flight))
+    if before is None or (before.size, before.mtime_ns) != state(flight):
+        return False
+    try:
+        return needs_science(read_header(flight), tuple(caches), staging)
+    except (Quarantine, Retry):
+        return False
+
+
 def judge(
-    path: Path, store: Store, caches: Sequence[Path], is_known: Callable[[str], bool]
+    path: Path,
+    store: Store,
+    caches: Sequence[Path],
+    is_known: Callable[[str], bool],
+    *,
+    anew: bool = False,
 ) -> Job | File | None:
     """A job where the file is to be decoded, a row for the ledger where not, None where nothing is new.
 
-    Reads nothing but the header, which takes well under a millisecond.
+    Reads nothing but the header, which takes well under a millisecond. `anew`: also one that is done with.
     """
     now, before = state(path), store.file(_text(path))
     if now is None:
         return _gone(before, store, is_known)
-    if before is not None and (before.size, before.mtime_ns) == now and _is_settled(before, caches, is_known):
+    is_same = before is not None and (before.size, before.mtime_ns) == now
+    if before is not None and is_same and not anew and _is_settled(before, caches, is_known):
         return None
     file = File(_text(path), *now, Status.WAITING)
     try:

@@ -20,7 +20,7 @@ import structlog
 
 from gliderwatch.config import Config, load
 from gliderwatch.errors import ConfigError, DamagedError, GliderwatchError
-from gliderwatch.ingest.watch import CacheChanged, EventsLost, FileChanged
+from gliderwatch.ingest.watch import CacheChanged, EventsLost, FileChanged, ScienceChanged
 from gliderwatch.run import arrivals, heartbeat, intake, notify, recovery
 from gliderwatch.run.heartbeat import Upkeep
 from gliderwatch.run.life import BEAT, Life
@@ -166,7 +166,7 @@ class Daemon:
             return
         if isinstance(news, Decoded):
             self._reception.decoded(news)
-        elif isinstance(news, FileChanged):
+        elif isinstance(news, FileChanged | ScienceChanged):
             arrivals.observe(news.path, self._parts.settling, time.monotonic())
         elif isinstance(news, CacheChanged):
             self._retry = True

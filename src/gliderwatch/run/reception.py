@@ -11,6 +11,9 @@ from pathlib import Path
 import structlog
 
 from gliderwatch.errors import Quarantine, StateError
+from gliderwatch.ingest import names
+from gliderwatch.ingest.caches import Staging
+from gliderwatch.ingest.science import flight_files
 from gliderwatch.ingest.watch import CacheChanged
 from gliderwatch.model import Alert, Segment
 from gliderwatch.run import arrivals, intake, logs
@@ -34,16 +37,27 @@ class Reception:
         self, store: Store, upkeep: Upkeep, wake: threading.Event, is_stopping: Callable[[], bool]
     ) -> None:
         self._store, self._upkeep, self._wake, self._is_stopping = store, upkeep, wake, is_stopping
-        self._heeded = time.time()
+        self._heeded, self._staging = time.time(), Staging()
 
     def use(self, parts: Parts) -> None:
         """Work with these parts; comes before all else."""
         self._parts = parts
 
     def judge(self, path: Path) -> None:
-        """Look at a file that has settled: it is queued for the decoder, or noted for what it is."""
+        """Look at a file that has settled: it is queued for the decoder, or noted for what it is.
+
+        Of a science file it is the flight file beside it that is looked at, anew, if it lacks the depth.
+        """
+        if not names.is_science(path.name):
+            self._judge(path)
+            return
+        for flight in flight_files(path):
+            if arrivals.lacks_depth(flight, self._store, self._parts.decoder.cache_folders, self._staging):
+                self._judge(flight, anew=True)
+
+    def _judge(self, path: Path, *, anew: bool = False) -> None:
         caches = self._parts.decoder.cache_folders
-        found = arrivals.judge(path, self._store, caches, self._is_known)
+        found = arrivals.judge(path, self._store, caches, self._is_known, anew=anew)
         if isinstance(found, Job):
             self._keep_list(path, found)
             self._upkeep.queued(found)
@@ -129,6 +143,9 @@ class Reception:
             reason = "older than what state.keep_days keeps"
             self._note(replace(file, status=Status.DUPLICATE, reason=reason, opened_at=None))
             return
+        if self._is_known_from_it(file, segment):
+            self._speak(glider)
+            return
         params, speaking = self._parts.config.glider(glider), self._speaking(glider)
         begun = time.monotonic()
         try:
@@ -142,6 +159,17 @@ class Reception:
             self._note(arrivals.failed(file, error))
         else:
             self._told(taken, time.monotonic() - begun)
+
+    def _is_known_from_it(self, file: File, segment: Segment) -> bool:
+        """Whether a file that was looked at anew, for what lies beside it, gave no more than before."""
+        before = self._store.file(file.path)
+        known = self._store.segments.completeness(segment.id.glider, segment.id.name)
+        return (
+            before is not None
+            and before.status == Status.TAKEN
+            and (before.size, before.mtime_ns) == (file.size, file.mtime_ns)
+            and known == segment.completeness
+        )
 
     def _note(self, file: File) -> None:
         """Write down what became of a file that is not taken (now), if that is new."""
