@@ -93,24 +93,40 @@ def test_a_replay_names_the_cache_file_that_is_another(site: Site, tmp_path: Pat
     assert "cannot be used: it is cut or changed" in " ".join((run.stdout + run.stderr).split())
 
 
+def depths(site: Site) -> int:
+    """How many samples of the depth are known of the segment of `flight`."""
+    with closing(Store.reading(site.state)) as store:
+        identity = SegmentId(dinkum.OPENED_AT, "unit_7", NAME)
+        return len(store.segments.get(identity).get("depth"))
+
+
 def test_the_science_file_that_comes_after_its_flight_file_gives_the_depth(site: Site) -> None:
     site.configure("unit_7")
     site.cache.joinpath(f"{dinkum.CRC}.cac").write_bytes(dinkum.sensor_list(NO_DEPTH))
     site.cache.joinpath(f"{OTHER}.cac").write_bytes(dinkum.sensor_list(SCIENCE, OTHER))
-    identity = SegmentId(dinkum.OPENED_AT, "unit_7", NAME)
-
-    def depths() -> int:
-        with closing(Store.reading(site.state)) as store:
-            return len(store.segments.get(identity).get("depth"))
-
     with Daemon(site) as daemon:
         site.put("unit_7", f"{NAME}.sbd", flight())
         until(lambda: site.statuses(f"{NAME}.sbd") == [Status.TAKEN], "taken")
-        assert depths() == 0
+        assert depths(site) == 0
         site.put("unit_7", f"{NAME}.tbd", science())
-        until(lambda: depths() > 30, "the depth is there")
+        until(lambda: depths(site) > 30, "the depth is there")
         site.put("unit_7", f"{NAME}.tcd", b"no data")  # looked at, and of no use
         site.put("unit_7", "unit_7-2024-250-1-4.sbd", b"no data")
         until(lambda: site.statuses("unit_7-2024-250-1-4.sbd") == [Status.QUARANTINED], "gone on")
         assert site.statuses(f"{NAME}.sbd") == [Status.TAKEN]
         assert len(daemon.log("file taken")) == 2
+
+
+def test_a_science_file_that_came_while_nobody_watched_gives_the_depth(site: Site) -> None:
+    site.configure("unit_7")
+    site.cache.joinpath(f"{dinkum.CRC}.cac").write_bytes(dinkum.sensor_list(NO_DEPTH))
+    site.cache.joinpath(f"{OTHER}.cac").write_bytes(dinkum.sensor_list(SCIENCE, OTHER))
+    with Daemon(site):
+        site.put("unit_7", f"{NAME}.sbd", flight())
+        until(lambda: site.statuses(f"{NAME}.sbd") == [Status.TAKEN], "taken")
+    assert depths(site) == 0
+    site.put("unit_7", f"{NAME}.tbd", science())
+    for _ in range(2):  # at the second start there is nothing to do any more
+        with Daemon(site) as daemon:
+            until(lambda: depths(site) > 30, "the depth is there")
+    assert len(daemon.log("file taken")) == 2  # of all three lives

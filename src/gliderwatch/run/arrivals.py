@@ -9,7 +9,7 @@ from pathlib import Path
 from gliderwatch.errors import MissingCache, Quarantine, Retry
 from gliderwatch.ingest.caches import Staging, is_there
 from gliderwatch.ingest.header import read_header
-from gliderwatch.ingest.science import needs_science
+from gliderwatch.ingest.science import needs_science, science_files
 from gliderwatch.ingest.settle import Settling
 from gliderwatch.run.backlog import Job
 from gliderwatch.store.sqlite import File, Status, Store
@@ -55,6 +55,17 @@ def lacks_depth(flight: Path, store: Store, caches: Sequence[Path], staging: Sta
         return needs_science(read_header(flight), tuple(caches), staging)
     except (Quarantine, Retry):
         return False
+
+
+def newer_science(flight: Path, store: Store) -> list[Path]:
+    """The science files beside a flight file that came after it was looked at, by this machine's clock."""
+    noted = store.noted_at(_text(flight))
+    if noted is None:
+        return []
+    try:
+        return [path for path in science_files(flight) if path.stat().st_ctime > noted]
+    except OSError:
+        return []
 
 
 def judge(

@@ -198,6 +198,9 @@ class Daemon:
                 return
             there.add(found.path)
             settling.observe(found.path, found.size, found.mtime_ns, time.monotonic())
+            if not self._caught_up:  # science files that came while nobody watched
+                for path in arrivals.newer_science(found.path, self._store):
+                    arrivals.observe(path, settling, time.monotonic())
         settling.only(there)
         took = time.monotonic() - begun  # where it takes long there is to be time for more than rescans
         self._next_scan = begun + took + max(took, self._parts.config.dockserver.rescan_seconds)
