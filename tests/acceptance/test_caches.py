@@ -61,8 +61,8 @@ def test_a_list_that_is_not_the_one_its_name_says_is_named_and_not_used(site: Si
     until(lambda: site.statuses(FILES[0].name) == [WAITING], "waits")
     (waiting,) = site.status()["waiting"]
     assert f"cache file {cache} cannot be used: it is cut or changed, or is another list" in waiting["reason"]
-    told = json.loads(command("doctor", "--json", "-c", site.config).stdout)
-    (found,) = [f for f in told["findings"] if f["topic"] == "caches"]
+    report = json.loads(command("doctor", "--json", "-c", site.config).stdout)
+    (found,) = [f for f in report["findings"] if f["topic"] == "caches"]
     assert found["level"] == "error"
     assert str(cache) in found["text"]
     assert f"not {cache.stem}" in found["text"]

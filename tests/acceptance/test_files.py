@@ -312,9 +312,9 @@ def test_a_glider_whose_folder_is_a_link_is_named_in_status_and_its_cure_works(
     (site.root / "angus").symlink_to(target.parent)
     (target / FILES[0].name).write_bytes(FILES[0].data)
     with Daemon(site):
-        told = command("status", "-c", site.config).stdout
-        assert f"angus: {site.root}/angus is a symbolic link, and links are not followed" in told
-        assert f"(write `paths: [{target}]` below the glider)" in told
+        shown = command("status", "-c", site.config).stdout
+        assert f"angus: {site.root}/angus is a symbolic link, and links are not followed" in shown
+        assert f"(write `paths: [{target}]` below the glider)" in shown
         link = {"path": f"{site.root}/angus", "target": str(target)}
         assert site.status()["links"] == {"angus": link}
     text = site.config.read_text(encoding="utf-8")

@@ -174,8 +174,8 @@ def test_other_files_and_folders_are_no_news(watch, dock):
         dock.cache / "notes.txt",
     ):
         path.write_bytes(b"data")
-    told = [change for change in drain(queue) if not isinstance(change, TreeChanged)]
-    assert set(told) <= {ScienceChanged(dock.inbox / "00930002.tbd")}
+    news = [change for change in drain(queue) if not isinstance(change, TreeChanged)]
+    assert set(news) <= {ScienceChanged(dock.inbox / "00930002.tbd")}
 
 
 def test_a_science_file_is_news_for_the_flight_file_beside_it(watch, dock):

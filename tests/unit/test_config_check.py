@@ -124,9 +124,9 @@ def test_a_glider_whose_folder_is_a_link_is_named_with_the_cure(found: Check, tr
     ]
     path = tree / "c.yml"
     path.write_text(text, encoding="utf-8")
-    told = [f for f in examine(path) if f.topic == "folders"]
-    assert [f.level.name for f in told] == ["ERROR"]
-    assert told[0].cure == f"write `paths: [{target}]` below the glider"
+    folders = [f for f in examine(path) if f.topic == "folders"]
+    assert [f.level.name for f in folders] == ["ERROR"]
+    assert folders[0].cure == f"write `paths: [{target}]` below the glider"
     cured = text.replace("  george:\n", f"  george: {{paths: ['{target}']}}\n")
     assert found(cured) == []
 

@@ -143,7 +143,7 @@ class Reception:
             reason = "older than what state.keep_days keeps"
             self._note(replace(file, status=Status.DUPLICATE, reason=reason, opened_at=None))
             return
-        if self._is_known_from_it(file, segment):
+        if self._gave_no_more(file, segment):
             self._speak(glider)
             return
         params, speaking = self._parts.config.glider(glider), self._speaking(glider)
@@ -160,15 +160,15 @@ class Reception:
         else:
             self._told(taken, time.monotonic() - begun)
 
-    def _is_known_from_it(self, file: File, segment: Segment) -> bool:
+    def _gave_no_more(self, file: File, segment: Segment) -> bool:
         """Whether a file that was looked at anew, for what lies beside it, gave no more than before."""
         before = self._store.file(file.path)
-        known = self._store.segments.completeness(segment.id.glider, segment.id.name)
+        held = self._store.segments.completeness(segment.id.glider, segment.id.name)
         return (
             before is not None
             and before.status == Status.TAKEN
             and (before.size, before.mtime_ns) == (file.size, file.mtime_ns)
-            and known == segment.completeness
+            and held == segment.completeness
         )
 
     def _note(self, file: File) -> None:
