@@ -111,15 +111,23 @@ class Staging:
 
     def _stage(self, crc: str, path: Path) -> Staged | str:
         try:
-            content, _ = read_regular(path, _LARGEST, links=True)
-            text = list_text(content, crc)
-            n_listed = text.count(b"\n")
-            sensors, _ = parse_sensor_list(text, 0, n_listed)
+            text, sensors = read_list(path, crc)
         except (ValueError, GliderwatchError) as error:
             return f"cannot be used: {error}"
         folder = Path(tempfile.mkdtemp(dir=self._folder.name))
         (folder / f"{crc}.cac").write_bytes(text)
-        return Staged(folder, n_listed, sensors)
+        return Staged(folder, text.count(b"\n"), sensors)
+
+
+def read_list(path: Path, crc: str) -> tuple[bytes, Sensors]:
+    """The sensor list `crc` in a cache file, as text and as what it says.
+
+    Raises `ValueError` or `GliderwatchError` with the reason where it is not that, or not whole.
+    """
+    content, _ = read_regular(path, _LARGEST, links=True)
+    text = list_text(content, crc)
+    sensors, _ = parse_sensor_list(text, 0, text.count(b"\n"))
+    return text, sensors
 
 
 def list_text(content: bytes, crc: str) -> bytes:

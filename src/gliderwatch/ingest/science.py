@@ -5,12 +5,13 @@ A glider writes tbd, nbd and ebd beside sbd, mbd and dbd, with the sensors of it
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.ingest import names
-from gliderwatch.ingest.caches import Staging
+from gliderwatch.ingest.caches import candidates, read_list
 from gliderwatch.ingest.header import Header
 from gliderwatch.ingest.segment import DEPTH, PRESSURES
 
@@ -33,13 +34,14 @@ def _beside(path: Path, suffixes: tuple[str, ...]) -> Iterator[Path]:
                 yield other
 
 
-def needs_science(header: Header, folders: tuple[Path, ...], staging: Staging) -> bool:
+def needs_science(header: Header, folders: Sequence[Path]) -> bool:
     """Whether the list of sensors of a flight file names nothing that tells the depth.
 
     False where the list is not known: then the file waits for it, or holds it, and is dealt with later.
     """
-    try:
-        held = staging.get(header, folders).sensors.names
-    except (GliderwatchError, OSError):
-        return False
-    return set(held).isdisjoint((DEPTH, *PRESSURES))
+    with suppress(OSError):
+        for path in candidates(header.crc, folders):
+            with suppress(GliderwatchError, ValueError):
+                _, sensors = read_list(path, header.crc)
+                return set(sensors.names).isdisjoint((DEPTH, *PRESSURES))
+    return False

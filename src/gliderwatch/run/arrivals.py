@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from gliderwatch.errors import MissingCache, Quarantine, Retry
-from gliderwatch.ingest.caches import Staging, is_there
+from gliderwatch.ingest.caches import is_there
 from gliderwatch.ingest.header import read_header
 from gliderwatch.ingest.science import needs_science, science_files
 from gliderwatch.ingest.settle import Settling
@@ -46,13 +46,13 @@ def settle_anew(path: Path, settling: Settling, now: float) -> None:
     observe(path, settling, now)
 
 
-def lacks_depth(flight: Path, store: Store, caches: Sequence[Path], staging: Staging) -> bool:
+def lacks_depth(flight: Path, store: Store, caches: Sequence[Path]) -> bool:
     """Whether a flight file that was looked at before, and is as it was, names no sensor of the depth."""
     before = store.file(_text(flight))
     if before is None or (before.size, before.mtime_ns) != state(flight):
         return False
     try:
-        return needs_science(read_header(flight), tuple(caches), staging)
+        return needs_science(read_header(flight), caches)
     except (Quarantine, Retry):
         return False
 

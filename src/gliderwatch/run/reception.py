@@ -12,7 +12,6 @@ import structlog
 
 from gliderwatch.errors import Quarantine, StateError
 from gliderwatch.ingest import names
-from gliderwatch.ingest.caches import Staging
 from gliderwatch.ingest.science import flight_files
 from gliderwatch.ingest.watch import CacheChanged
 from gliderwatch.model import Alert, Segment
@@ -37,7 +36,7 @@ class Reception:
         self, store: Store, upkeep: Upkeep, wake: threading.Event, is_stopping: Callable[[], bool]
     ) -> None:
         self._store, self._upkeep, self._wake, self._is_stopping = store, upkeep, wake, is_stopping
-        self._heeded, self._staging = time.time(), Staging()
+        self._heeded = time.time()
 
     def use(self, parts: Parts) -> None:
         """Work with these parts; comes before all else."""
@@ -52,7 +51,7 @@ class Reception:
             self._judge(path)
             return
         for flight in flight_files(path):
-            if arrivals.lacks_depth(flight, self._store, self._parts.decoder.cache_folders, self._staging):
+            if arrivals.lacks_depth(flight, self._store, self._parts.decoder.cache_folders):
                 self._judge(flight, anew=True)
 
     def _judge(self, path: Path, *, anew: bool = False) -> None:
