@@ -95,9 +95,11 @@ def ack(config_path: Path, incident: str, by: str | None, note: str) -> None:
 def backup(config_path: Path, file: Path) -> None:
     """Copy the state to a file while the service runs, and see that the copy is whole."""
     from gliderwatch.config import load
+    from gliderwatch.run.manage.places import not_on_dockserver
     from gliderwatch.store.backup import backup as make
 
-    size = make(Path(load(config_path).state.path), file)
+    config = load(config_path)
+    size = make(Path(config.state.path), not_on_dockserver(config, file))
     click.echo(f"{file}: {size / 1e6:.1f} MB, whole")
 
 

@@ -94,9 +94,9 @@ def files(counts: dict[Status, int], left_out: Sequence[File], console: Console,
     for (status, reason), same in list(alike.items())[:most]:
         path = clean(same[0].path, 500)
         text = (
-            f"{path}: {clean(reason)}"
+            f"{path}: {clean(reason, 2000)}"
             if len(same) == 1
-            else f"{len(same)} files: {clean(reason)}; such as {path}"
+            else f"{len(same)} files: {clean(reason, 2000)}; such as {path}"
         )
         console.print(Text(f"  {status}  {text}"), soft_wrap=True)
     rest = sum(len(same) for same in list(alike.values())[most:])
@@ -128,6 +128,9 @@ def status(view: Overview, console: Console) -> None:
             taken_on = "" if ack is None else f", {acknowledged(ack, i)}"
             console.print(Text(text + taken_on, style=_STYLES[i.severity]))
     files(view.files, [*view.waiting, *view.quarantined], console)
+    for name, link in view.links.items():
+        text = f"{clean(name, 30)}: {clean(str(link), 600)} ({clean(link.cure, 600)})"
+        console.print(Text(text, style="bold red"), soft_wrap=True)
     if view.unknown:
         names = ", ".join(clean(g) for g in sorted({f.glider for f in view.unknown}))
         console.print(

@@ -161,6 +161,14 @@ def problems(path: Path) -> list[str]:
             "3: gliders.my glider: must be a name of letters, digits, `-` and `_`",
         ),
         (
+            MINIMAL + "gliders:\n  '#2!':",
+            '3: gliders."#2!": must be a name of letters, digits, `-` and `_`',
+        ),
+        (
+            MINIMAL + "channels:\n  $mail: {url: json://x}",
+            '3: channels."$mail": must be a name of letters, digits, `-` and `_`',
+        ),
+        (
             MINIMAL + "gliders:\n  Electa:\n  electa:",
             "4: gliders.electa: given twice (case aside) (keep one)",
         ),

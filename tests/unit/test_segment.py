@@ -5,7 +5,13 @@ import numpy as np
 import pytest
 
 from gliderwatch.ingest.header import Header
-from gliderwatch.ingest.segment import QUANTITIES, SENSORS, build_segment, model_declination
+from gliderwatch.ingest.segment import (
+    QUANTITIES,
+    SENSORS,
+    build_segment,
+    depth_of,
+    model_declination,
+)
 from gliderwatch.model import SegmentId
 
 T0 = datetime(2022, 11, 7, tzinfo=UTC).timestamp()
@@ -44,6 +50,22 @@ def test_units_become_si(sensor, raw, name, value):
     series = build(**{sensor: ([T0], [raw])}).get(name)
     assert series.t.tolist() == [T0]
     assert series.v.tolist() == pytest.approx([value])
+
+
+def test_pressure_stands_in_for_a_depth_that_is_missing():
+    """UNESCO (1983), technical papers in marine science 44, p. 28: 9712.653 m at 10000 dbar, 30 degrees."""
+    bar = [0.0, 1.0, 100.0, 196.0]
+    depth = build(m_pressure=(times(4), bar)).get("depth")
+    assert depth.t.tolist() == times(4)
+    assert depth.v.tolist() == pytest.approx([0.0, 9.92, 991.3, 1935.0], rel=3e-3)
+    assert depth_of(np.array([1000.0])) == pytest.approx([9712.653], rel=3e-3)
+    empty = build(m_pressure=(times(4), bar), m_depth=([], []))
+    assert empty.get("depth").v.tolist() == depth.v.tolist()
+
+
+def test_pressure_does_not_stand_in_for_a_depth_that_is_there():
+    depth = build(m_pressure=(times(3), [1.0, 2.0, 3.0]), m_depth=([T0], [7.0])).get("depth")
+    assert depth.v.tolist() == [7.0]
 
 
 def test_positions_become_degrees():

@@ -134,9 +134,7 @@ def _overdue(now: float) -> Alert:
 def _unknown(now: float) -> Alert:
     words = "cache file 0a1b2c3d.cac is missing: not in /var/opt/gmc/cache"
     waits = [
-        unknown.Unjudged(
-            now - (4 * n + 3) * _HOUR, now - 4 * n * _HOUR, Hindrance.NO_CACHE, words, "0a1b2c3d"
-        )
+        unknown.Unjudged(now - start * _HOUR, now - end * _HOUR, Hindrance.NO_CACHE, words, "0a1b2c3d")
         for start, end in ((23, 20), (19, 16), (15, 12), (11, 8), (7, 4), (3, 0))
     ]
     found = unknown.Blindness(GLIDER, now - 24 * _HOUR, now, now - 24 * _HOUR, tuple(waits))

@@ -20,7 +20,7 @@ import structlog
 
 from gliderwatch.config import Config, load
 from gliderwatch.errors import ConfigError, DamagedError, GliderwatchError
-from gliderwatch.ingest.watch import CacheChanged, EventsLost, FileChanged
+from gliderwatch.ingest.watch import CacheChanged, EventsLost, FileChanged, ScienceChanged
 from gliderwatch.run import arrivals, intake, notify, preconditions, recovery
 from gliderwatch.run.heartbeat import Upkeep
 from gliderwatch.run.life import BEAT, Life
@@ -172,7 +172,7 @@ class Daemon:
             return
         if isinstance(news, Decoded):
             self._reception.decoded(news)
-        elif isinstance(news, FileChanged):
+        elif isinstance(news, FileChanged | ScienceChanged):
             arrivals.observe(news.path, self._parts.settling, time.monotonic())
         elif isinstance(news, CacheChanged):
             self._retry = True
@@ -204,6 +204,9 @@ class Daemon:
                 return
             there.add(found.path)
             settling.observe(found.path, found.size, found.mtime_ns, time.monotonic())
+            if not self._caught_up:  # science files that came while nobody watched
+                for path in arrivals.newer_science(found.path, self._store):
+                    arrivals.observe(path, settling, time.monotonic())
         settling.only(there)
         took = time.monotonic() - begun  # where it takes long there is to be time for more than rescans
         self._next_scan = begun + took + max(took, self._parts.config.dockserver.rescan_seconds)
@@ -214,7 +217,7 @@ class Daemon:
     def _retry_waiting(self) -> None:
         """Look again at the files that wait; one that has changed since has to settle first."""
         self._retry = False
-        self._parts.decoder.cache_folders = self._parts.watcher.cache_folders()
+        self._parts.decoder.cache_folders = self._parts.cache_folders()
         for file in self._store.files(Status.WAITING, Status.UNKNOWN):
             path = Path(file.path)
             if arrivals.state(path) in (None, (file.size, file.mtime_ns)):

@@ -11,6 +11,9 @@ from pathlib import Path
 import structlog
 
 from gliderwatch.errors import Quarantine, StateError
+from gliderwatch.ingest import names
+from gliderwatch.ingest.science import flight_files
+from gliderwatch.ingest.watch import CacheChanged
 from gliderwatch.model import Alert, Segment
 from gliderwatch.run import arrivals, intake, logs
 from gliderwatch.run.backlog import Job
@@ -47,16 +50,39 @@ class Reception:
         self._parts = parts
 
     def judge(self, path: Path) -> None:
-        """Look at a file that has settled: it is queued for the decoder, or noted for what it is."""
+        """Look at a file that has settled: it is queued for the decoder, or noted for what it is.
+
+        Of a science file it is the flight file beside it that is looked at, anew, if it lacks the depth.
+        """
+        if not names.is_science(path.name):
+            self._judge(path)
+            return
+        for flight in flight_files(path):
+            if arrivals.lacks_depth(flight, self._store, self._parts.decoder.cache_folders):
+                self._judge(flight, anew=True)
+
+    def _judge(self, path: Path, *, anew: bool = False) -> None:
         caches = self._parts.decoder.cache_folders
-        found = arrivals.judge(path, self._store, caches, self._is_known)
+        found = arrivals.judge(path, self._store, caches, self._is_known, anew=anew)
         if isinstance(found, Job):
+            self._keep_list(path, found)
             self._upkeep.queued(found)
             self._parts.backlog.add(found)
         elif found is not None:
             self._note(found)
         if arrivals.state(path) is None:  # it may come back as it was: a share that was away
             self._parts.settling.forget(path)
+
+    def _keep_list(self, path: Path, job: Job) -> None:
+        """Keep the sensor list that a file holds: others that left it out may wait for it."""
+        try:
+            kept = self._parts.lists.keep(path, job.header)
+        except OSError as error:
+            log.warning("sensor list cannot be kept", path=str(path), crc=job.header.crc, reason=str(error))
+            return
+        if kept is not None:
+            log.info("sensor list kept", path=str(path), crc=job.header.crc)
+            self._parts.news.put(CacheChanged(kept))
 
     def decoded(self, news: Decoded) -> None:
         """Take the files of a glider that are decoded, in their order.
@@ -137,6 +163,9 @@ class Reception:
             reason = "older than what state.keep_days keeps"
             self._note(replace(file, status=Status.DUPLICATE, reason=reason, opened_at=None))
             return
+        if self._gave_no_more(file, segment):
+            self._speak(glider)
+            return
         params, speaking = self._parts.config.glider(glider), self._speaking(glider)
         begun = time.monotonic()
         try:
@@ -150,6 +179,17 @@ class Reception:
             self._note(arrivals.failed(file, error))
         else:
             self._told(taken, time.monotonic() - begun)
+
+    def _gave_no_more(self, file: File, segment: Segment) -> bool:
+        """Whether a file that was looked at anew, for what lies beside it, gave no more than before."""
+        before = self._store.file(file.path)
+        held = self._store.segments.completeness(segment.id.glider, segment.id.name)
+        return (
+            before is not None
+            and before.status == Status.TAKEN
+            and (before.size, before.mtime_ns) == (file.size, file.mtime_ns)
+            and held == segment.completeness
+        )
 
     def _note(self, file: File) -> None:
         """Write down what became of a file that is not taken (now), if that is new."""

@@ -18,6 +18,7 @@ from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine, Retry
 from gliderwatch.ingest import names
 from gliderwatch.ingest.decode import Decoder
 from gliderwatch.ingest.header import read_header
+from gliderwatch.ingest.lists import SensorLists, lists_folder
 from gliderwatch.model import Alert, Hindrance, Segment
 from gliderwatch.params import GliderParams
 from gliderwatch.rules.silence import GONE
@@ -31,7 +32,7 @@ from gliderwatch.run.speaking import NOBODY, speaking
 from gliderwatch.run.turns import Turns
 from gliderwatch.store.database import MEMORY, refuse_foreign
 from gliderwatch.store.outbox import Outbox
-from gliderwatch.store.sqlite import Status, Store
+from gliderwatch.store.sqlite import File, Status, Store
 
 STATE = "replay.sqlite"
 """Name of the state file in the folder of results: another one than a daemon's usual."""
@@ -94,17 +95,17 @@ def replay(
         where = ", ".join(map(str, request.folders))
         raise GliderwatchError(f"no flight data files (sbd, scd, mbd, mcd, dbd, dcd) below {where}")
     on_total(len(files))
-    caches = cache_folders(request)
-    with _state(request) as path:
+    with _state(request) as path, tempfile.TemporaryDirectory(prefix="gliderwatch-") as kept:
+        lists = SensorLists(Path(kept))
         ocean = None if request.config is None else Ocean(request.config)
         report = Report(Store.open(path, durable=False), ocean)
         with _speaking(request, path, report) as told:
-            jobs = _triage(files, report, caches, request, on_file)
+            jobs = _triage(files, report, lists, request, on_file)
             _check_glider(request, jobs, report.store)
             for job in jobs:
                 report.coming.setdefault(job.header.id.glider, deque()).append(job.header.id.opened_at)
             turns = Turns(jobs)
-            for decoded in _decoded(jobs, caches, workers):
+            for decoded in _decoded(jobs, [*cache_folders(request), lists.folder], workers):
                 for job, sent in turns.after(decoded):
                     _take(job, sent, report, request, told, on_file)
         if request.out is not None:
@@ -128,10 +129,12 @@ def find_files(folders: Iterable[Path]) -> list[Path]:
 
 
 def cache_folders(request: Request) -> list[Path]:
-    """The cache folders named and configured, the folders replayed, and any `cache` in or beside them."""
+    """The cache folders named and configured, the folders replayed, any `cache` in or beside them, and the
+    lists that the service of the configuration has kept."""
     folders = [*request.caches]
     if request.config is not None:
         folders += expand(request.config.dockserver.cache)
+        folders.append(lists_folder(Path(request.config.state.path)))
     for folder in request.folders:
         around = [
             folder,
@@ -204,24 +207,45 @@ def _at_once(config: Config) -> Speaking:
 def _triage(
     files: Sequence[Path],
     report: Report,
-    caches: Sequence[Path],
+    lists: SensorLists,
     request: Request,
     on_file: Callable[[intake.Taken], None],
 ) -> list[Job]:
-    """The files to decode in the order of time, the fullest copy of a segment first."""
-    jobs: list[Job] = []
-    for path in files:
+    """The files to decode in the order of time, the fullest copy of a segment first.
+
+    Those that leave their sensor list out are looked at last: any of the others may hold it.
+    """
+    caches = [*cache_folders(request), lists.folder]
+    jobs, noted = list[Job](), list[File]()
+
+    def look(path: Path) -> None:
         found = arrivals.judge(path, report.store, caches, request.is_wanted)
         if isinstance(found, Job):
+            lists.keep(path, found.header)
             jobs.append(found)
-        elif found is not None and found.hindrance is Hindrance.NO_CACHE:
-            # a sign of life of its time: it has its turn with the others
-            jobs.append(Job(found, read_header(path), MissingCache(found.crc, caches)))
         elif found is not None:
-            if found.status == Status.UNKNOWN and request.glider is not None:
-                found = replace(found, reason=f"of {found.glider}, not of {request.glider}")
-            _count(intake.note(report.store, found, GliderParams(), None, time.time()), report, on_file)
+            noted.append(found)
+
+    for path in files:
+        look(path)
+    waiting, noted = [file for file in noted if file.crc], [file for file in noted if not file.crc]
+    for file in waiting:
+        look(Path(file.path))
+    for found in noted:
+        if (
+            found.hindrance is Hindrance.NO_CACHE
+        ):  # a sign of life of its time: it has its turn with the others
+            jobs.append(Job(found, read_header(Path(found.path)), MissingCache(found.crc, caches)))
+        else:
+            _note(found, report, request, on_file)
     return sorted(jobs, key=lambda j: (j.header.id, -names.rank(j.header.kind), j.file.path))
+
+
+def _note(file: File, report: Report, request: Request, on_file: Callable[[intake.Taken], None]) -> None:
+    """Write down a file that is not decoded."""
+    if file.status == Status.UNKNOWN and request.glider is not None:
+        file = replace(file, reason=f"of {file.glider}, not of {request.glider}")
+    _count(intake.note(report.store, file, GliderParams(), None, time.time()), report, on_file)
 
 
 def _check_glider(request: Request, jobs: Sequence[Job], store: Store) -> None:

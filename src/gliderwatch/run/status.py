@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from gliderwatch.config import Config
+from gliderwatch.config import Config, Link, linked_gliders
 from gliderwatch.model import Assessment, Expected, Incident
 from gliderwatch.params import Attention
 from gliderwatch.rules.acknowledged import Acks
@@ -74,6 +74,7 @@ class Overview:
     """All that `status` tells: whether the daemon is ``running``, since when it is silent (s; None: ever).
 
     ``held`` are messages that are to wait; ``undelivered`` those that should have been delivered.
+    ``links`` stand where the folders of gliders should be of which nothing is known.
     """
 
     running: bool
@@ -85,6 +86,7 @@ class Overview:
     unknown: tuple[File, ...]
     undelivered: tuple[Undelivered, ...]
     held: tuple[Undelivered, ...] = ()
+    links: dict[str, Link] = field(default_factory=dict)
 
     @property
     def alive(self) -> bool:
@@ -101,6 +103,7 @@ def overview(config: Config) -> Overview:
         with store.guarded():
             waiting = store.undelivered()
             names = sorted({*config.gliders, *store.gliders()})
+            silent = set(config.gliders) - set(store.gliders())
             return Overview(
                 running=is_held(path),
                 silent_for=silence(path),
@@ -111,6 +114,7 @@ def overview(config: Config) -> Overview:
                 unknown=tuple(store.files(Status.UNKNOWN)),
                 undelivered=(*(u for u in waiting if u.held_until <= now), *store.refused(now - WEEK)),
                 held=tuple(u for u in waiting if u.held_until > now),
+                links=linked_gliders(config, silent) if silent else {},
             )
     finally:
         store.close()
@@ -152,6 +156,7 @@ def as_json(view: Overview) -> dict[str, Any]:
         "files": {str(status): n for status, n in view.files.items()},
         "waiting": [{"path": f.path, "reason": f.reason, "cache": f.crc or None} for f in view.waiting],
         "quarantined": [{"path": f.path, "reason": f.reason} for f in view.quarantined],
+        "links": {name: {"path": str(k.path), "target": str(k.target)} for name, k in view.links.items()},
         "unknown_gliders": sorted({f.glider for f in view.unknown}),
         "undelivered": [
             {"alert": u.alert, "channel": u.channel, "attempts": u.attempts, "error": u.error}

@@ -99,6 +99,11 @@ class Store:
         row = self._db.execute("SELECT * FROM files WHERE path = ?", (path,)).fetchone()
         return file_of(row) if row is not None else None
 
+    def noted_at(self, path: str) -> float | None:
+        """When it was last written down what became of a path (s); None where the ledger has it not."""
+        row = self._db.execute("SELECT noted_at FROM files WHERE path = ?", (path,)).fetchone()
+        return None if row is None else float(row[0])
+
     def files(self, *statuses: Status) -> list[File]:
         """The files of some statuses, by path."""
         marks = ",".join("?" * len(statuses))
