@@ -205,11 +205,7 @@ def _service(url: str) -> tuple[Any, tuple[str, ...]]:
     finally:
         logger.removeHandler(warnings)
     told = tuple(dict.fromkeys(scrub(text, url) for text in warnings.texts))
-    if (
-        service is not None
-        and service.url().startswith(("mailto://", "mailtos://"))
-        and not _names_somebody(url)
-    ):
+    if service is not None and _is_mail(service) and not _names_somebody(url):
         raise DeliveryError(_NOBODY)
     if service is None:
         reason = "; ".join(told) or "no service known for it"
@@ -219,6 +215,10 @@ def _service(url: str) -> tuple[Any, tuple[str, ...]]:
     if "overflow=" not in url:
         service.overflow_mode = apprise.OverflowMode.TRUNCATE  # a cut alert says more than a refused one
     return service, told
+
+
+def _is_mail(service: Any) -> bool:
+    return str(service.url()).startswith(("mailto://", "mailtos://"))
 
 
 def _names_somebody(url: str) -> bool:
