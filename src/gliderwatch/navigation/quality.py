@@ -69,6 +69,7 @@ def _heading_length(samples: Samples, flight: Flight) -> float:
 def segment_notes(segment: Segment, declination: float | None, from_model: bool) -> tuple[str, ...]:
     """Notes on the data of one segment; `declination` (rad) is the one used, perhaps `from_model`."""
     notes = [f"{n} values of {name} out of range dropped" for name, n in sorted(segment.dropped.items())]
+    notes += segment.notes
     if declination is None:
         notes.append("magnetic declination unknown: headings and currents are relative to magnetic north")
     elif from_model and segment.declination is not None:
