@@ -97,6 +97,9 @@ def status(view: Overview, console: Console) -> None:
             text = f"{clean(i.glider)}: {i.kind} open since {utc(i.since)}, {i.dives} dives"
             taken_on = "" if ack is None else f", {acknowledged(ack, i)}"
             console.print(Text(text + taken_on, style=_STYLES[i.severity]))
+    for glider in view.gliders:
+        for each in glider.irregularities:
+            console.print(Text(f"since {utc(each.t)}: {clean(each.title)}", style="yellow"), soft_wrap=True)
     files(view.files, [*view.waiting, *view.quarantined], console)
     if view.unknown:
         names = ", ".join(clean(g) for g in sorted({f.glider for f in view.unknown}))

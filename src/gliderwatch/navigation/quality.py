@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from gliderwatch.model import Fix, Segment
+from gliderwatch.navigation.clock import span
 from gliderwatch.navigation.fixes import FASTEST, distance
 from gliderwatch.navigation.flight import SPARSE, Flight
 from gliderwatch.navigation.samples import Samples, get
@@ -76,6 +77,17 @@ def segment_notes(segment: Segment, declination: float | None, from_model: bool)
         notes.append(f"magnetic declination from the model {segment.declination_source}")
     if not len(segment.get("heading")) and len(segment.get("heading_commanded")):
         notes.append("commanded heading used, the measured one is not in the file")
+    return tuple(notes)
+
+
+def corrected_notes(ahead: float, surface: float) -> tuple[str, ...]:
+    """Notes on a clock that was set ``ahead`` (s), and on a depth sensor that shows ``surface`` (m) at the
+    surface; 0: neither."""
+    notes = []
+    if ahead:
+        notes.append(f"the glider's clock was set forward by {span(ahead)}, or it stayed at the surface")
+    if surface:
+        notes.append(f"depth is {surface:.1f} m at the surface: taken off (the pressure was not zeroed)")
     return tuple(notes)
 
 

@@ -41,12 +41,14 @@ class Thread:
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """What people have been told of one glider; ``surfaced`` is the surfacing of the last notice (s), and
-    ``silences`` what was told of its staying away (`rules.overdue`)."""
+    """What people have been told of one glider; ``surfaced`` is the surfacing of the last notice (s),
+    ``silences`` what was told of its staying away (`rules.overdue`), ``irregularities`` the ids of those of
+    its files."""
 
     threads: tuple[Thread, ...] = ()
     surfaced: float | None = None
     silences: tuple[Silence, ...] = ()
+    irregularities: tuple[str, ...] = ()
 
 
 class Known(Protocol):

@@ -67,7 +67,7 @@ class Known(Protocol):
         """Whether a dive began at `since` (s) or later, also one that has not ended or cannot be used."""
 
     def signs(self, since: float) -> tuple[Sign, ...]:
-        """Its files that were opened at `since` (s) or later."""
+        """Its files that were opened at `since` (s) or later, or that came since."""
 
 
 def hear(silences: tuple[Silence, ...], known: Known, now: float) -> tuple[tuple[Silence, ...], list[Alert]]:

@@ -10,7 +10,7 @@ from gliderwatch.errors import GliderwatchError, Quarantine
 from gliderwatch.model import Alert, Assessment, Segment, SegmentId
 from gliderwatch.params import Attention, GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
-from gliderwatch.rules import overdue, silence
+from gliderwatch.rules import irregularities, overdue, silence
 from gliderwatch.rules.announce import due
 from gliderwatch.store.sqlite import File, Status, Store
 
@@ -59,7 +59,7 @@ def take(
     glider = segment.id.glider
     with store.transaction():
         store.hear(segment.id, segment.last_t, now)
-        known = store.segments.completeness(glider, segment.id.name)
+        known = store.segments.completeness(segment.id)
         if known is not None and known >= segment.completeness:
             file = replace(file, status=Status.DUPLICATE, reason="this segment is known from a fuller copy")
             store.note(file, now)
@@ -169,7 +169,11 @@ def _speak(
         speaking.notices(glider),
         store.notes.acks(glider),
     )
-    alerts = [*heard, *alerts]
+    found = irregularities.found(
+        glider, store.clock_steps(glider), store.known(glider).places(irregularities.PLACES)
+    )
+    ids, notices = irregularities.due(before.irregularities, found, now)
+    said, alerts = replace(said, irregularities=ids), [*heard, *notices, *alerts]
     if said != before or alerts:
         store.say(glider, said, alerts, speaking.channels, now)
     return tuple(alerts)

@@ -10,7 +10,9 @@ from typing import Any
 from gliderwatch.config import Config
 from gliderwatch.model import Assessment, Expected, Incident
 from gliderwatch.params import Attention
+from gliderwatch.rules import irregularities
 from gliderwatch.rules.acknowledged import Acks
+from gliderwatch.rules.irregularities import Irregularity
 from gliderwatch.rules.overdue import RECENT
 from gliderwatch.rules.silence import GONE, Awaited, awaited, guess, is_launched
 from gliderwatch.run.life import STALE, is_held, silence
@@ -27,7 +29,7 @@ class GliderStatus:
     """One glider: its last dive that ended, the open incidents, how many segments and dives are known.
 
     ``expected`` and ``awaited``: the next surfacing, as known ``at`` a time (s). ``acks``: who has taken
-    incidents on.
+    incidents on. ``irregularities`` of its files in the last 30 days.
     """
 
     name: str
@@ -41,6 +43,7 @@ class GliderStatus:
     expected: Expected | None = None
     awaited: Awaited | None = None
     acks: Acks = field(default_factory=dict)
+    irregularities: tuple[Irregularity, ...] = ()
 
     @property
     def is_over(self) -> bool:
@@ -125,8 +128,10 @@ def _glider(store: Store, name: str, config: Config, now: float) -> GliderStatus
         expected = guess(signs, now)
     call = awaited(expected, signs, now, attention.overdue_hours) if expected is not None else None
     configured = name in config.gliders
+    found = irregularities.found(name, store.clock_steps(name), known.places(irregularities.PLACES))
+    recent = tuple(i for i in found if now - i.t < GONE)
     return GliderStatus(
-        name, configured, segments, dives, latest, incidents, now, attention, expected, call, acks
+        name, configured, segments, dives, latest, incidents, now, attention, expected, call, acks, recent
     )
 
 
@@ -142,6 +147,7 @@ def as_json(view: Overview) -> dict[str, Any]:
                 "dives": g.dives,
                 "latest": assessment_line(g.latest) if g.latest is not None else None,
                 "incidents": [_incident(i, g.acks) for i in g.incidents],
+                "irregularities": [{"since": iso(i.t), "title": i.title} for i in g.irregularities],
                 **_silence(g),
             }
             for g in view.gliders

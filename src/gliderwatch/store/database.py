@@ -12,7 +12,7 @@ from gliderwatch.errors import DamagedError, StateError
 
 __all__ = ["MEMORY", "SCHEMA", "StateError", "connect", "guarded", "read_only", "schema"]
 
-SCHEMA = 4
+SCHEMA = 5
 MIGRATIONS: dict[int, str] = {
     2: """
 CREATE TABLE expected (           -- the next surfacing, as expected after each segment
@@ -53,6 +53,56 @@ CREATE INDEX acks_by_glider ON acks (glider);
 ALTER TABLE outbox ADD COLUMN held_until REAL NOT NULL DEFAULT 0;     -- not sent before; infinite: never
 ALTER TABLE outbox ADD COLUMN escalates REAL NOT NULL DEFAULT 9e999;  -- while nobody acknowledges, sent then
 CREATE INDEX outbox_by_delivery ON outbox (delivered_at);
+""",
+    5: """
+CREATE TABLE segments_5 (
+    glider       TEXT NOT NULL,
+    opened_at    REAL NOT NULL,        -- as corrected: the glider's clock and clock_offset
+    name         TEXT NOT NULL,        -- not unique: a mission counter may begin again
+    completeness TEXT NOT NULL,
+    milestone    INTEGER NOT NULL,     -- 1 where the checkpoint is kept for good
+    last_t       REAL NOT NULL,        -- its last sample, by the glider's clock
+    clock_offset REAL NOT NULL DEFAULT 0,  -- added to the glider's clock (s)
+    clock_step   REAL NOT NULL DEFAULT 0,  -- by how much that was set back before it (s; 0: not)
+    segment      BLOB NOT NULL,        -- its times are those of the glider's clock
+    checkpoint   BLOB,                 -- NULL where thinned out: the next older one is gone on from
+    PRIMARY KEY (glider, opened_at, name)
+) STRICT;
+INSERT INTO segments_5 (glider, opened_at, name, completeness, segment, checkpoint, milestone, last_t)
+    SELECT s.glider, s.opened_at, s.name, s.completeness, s.segment, s.checkpoint, s.milestone,
+        coalesce(h.last_t, s.opened_at)
+    FROM segments s LEFT JOIN heard h ON h.glider = s.glider AND h.segment = s.name;
+DROP TABLE segments;
+ALTER TABLE segments_5 RENAME TO segments;
+CREATE INDEX segments_by_name ON segments (glider, name);
+CREATE INDEX segments_to_resume_from ON segments (glider, opened_at, name) WHERE checkpoint IS NOT NULL;
+CREATE INDEX segments_with_step ON segments (glider) WHERE clock_step != 0;
+CREATE TABLE heard_5 (
+    glider       TEXT NOT NULL,
+    segment      TEXT NOT NULL,
+    opened_at    REAL NOT NULL,        -- as corrected
+    last_t       REAL,                 -- as corrected; NULL where it is not read
+    at           REAL NOT NULL,
+    clock_offset REAL NOT NULL DEFAULT 0,
+    PRIMARY KEY (glider, opened_at, segment)
+) STRICT;
+INSERT INTO heard_5 (glider, segment, opened_at, last_t, at)
+    SELECT glider, segment, opened_at, last_t, at FROM heard;
+DROP TABLE heard;
+ALTER TABLE heard_5 RENAME TO heard;
+CREATE INDEX heard_by_segment ON heard (glider, segment);
+CREATE TABLE expected_5 (
+    glider    TEXT NOT NULL,
+    segment   TEXT NOT NULL,
+    opened_at REAL NOT NULL,
+    after     REAL NOT NULL,
+    data      TEXT NOT NULL,
+    PRIMARY KEY (glider, opened_at, segment)
+) STRICT;
+INSERT INTO expected_5 SELECT glider, segment, opened_at, after, data FROM expected;
+DROP TABLE expected;
+ALTER TABLE expected_5 RENAME TO expected;
+CREATE INDEX expected_in_order ON expected (glider, after, opened_at);
 """,
 }
 """SQL that leads from the schema before to the one of the key. A state file is never written by an older

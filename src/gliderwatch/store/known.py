@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 
-from gliderwatch.model import Assessment, Expected, Incident
+from gliderwatch.model import Assessment, Expected, Fix, Incident
 from gliderwatch.rules.silence import Sign
 from gliderwatch.store.rows import values
 
@@ -58,7 +58,16 @@ class Known:
         )
         return bool(self._db.execute(sql, (self.glider, since)).fetchone()[0])
 
+    def places(self, n: int) -> list[Fix]:
+        """Where and when it surfaced the last `n` times that are known, in order of time."""
+        sql = (
+            "SELECT t_surface, json_extract(data, '$.lat'), json_extract(data, '$.lon') FROM assessments "
+            "WHERE glider = ? AND ended = 1 ORDER BY t_surface DESC LIMIT ?"
+        )
+        rows = self._db.execute(sql, (self.glider, n)).fetchall()
+        return [Fix(*row) for row in reversed(rows) if row[1] is not None and row[2] is not None]
+
     def signs(self, since: float) -> tuple[Sign, ...]:
-        """Its files that were opened at `since` (s) or later."""
-        sql = "SELECT opened_at, last_t, at FROM heard WHERE glider = ? AND opened_at >= ?"
+        """Its files that were opened at `since` (s) or later, or that came since."""
+        sql = "SELECT opened_at, last_t, at FROM heard WHERE glider = ?1 AND (opened_at >= ?2 OR at >= ?2)"
         return tuple(Sign(*row) for row in self._db.execute(sql, (self.glider, since)))
