@@ -28,6 +28,10 @@ LEAST_STEP = HOUR
 """Seconds: a clock that was set forward by less looks like a long call."""
 SILENT_AT_MOST = 60 * DAY
 """Seconds without a segment over which a step of `ROLLOVER` is still known for one."""
+ENOUGH = 4
+"""Segments of a mission that say how long one may be."""
+WILD = 2.0
+"""Times the second longest segment beyond which the end of the longest is a wild time stamp."""
 SAME_OPENING = 120.0
 """Seconds: two files of one name that open further apart are of two segments. The sbd, mbd and dbd of one
 segment open within seconds; a mission counter begins again at 0 after a restart of the glider."""
@@ -96,12 +100,20 @@ def corrections(stamps: Sequence[Stamp], start: Correction = Correction()) -> li
         return [start] * len(stamps)
     before: Stamp | None = None
     offset = start.offset
-    for stamp in sorted(stamps, key=lambda s: s.number):
+    for stamp in _with_sound_ends(sorted(stamps, key=lambda s: s.number)):
         if before is not None:
             found[stamp.number] = _after(before, offset, stamp)
             offset = found[stamp.number].offset
         before = stamp
     return [found[stamp.number] for stamp in stamps]
+
+
+def _with_sound_ends(stamps: list[Stamp]) -> list[Stamp]:
+    """The segments in order; one that is far longer than all others has a wild time stamp, no known end."""
+    if len(stamps) < ENOUGH:
+        return stamps
+    longest = WILD * sorted(s.last_t - s.opened_at for s in stamps)[-2]
+    return [s if s.last_t - s.opened_at <= longest else replace(s, last_t=s.opened_at) for s in stamps]
 
 
 def _after(before: Stamp, offset: float, stamp: Stamp) -> Correction:
