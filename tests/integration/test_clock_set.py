@@ -134,6 +134,27 @@ class TestNotKnownByHowMuch:
         assert [a.flag for a in store.assessments("unit")] == [0] * len(MISSION)
 
 
+def test_a_restart_with_a_wrong_clock_is_told_and_the_glider_has_called():
+    """A new mission, dated twenty years ago: its numbers tell nothing."""
+    again = [
+        replace(s, id=replace(s.id, name=f"unit-2004-100-0-{k}"))
+        for k, s in enumerate(shifted(s, -WEEKS - 5 * DAY) for s in MISSION[15:])
+    ]
+    store, alerts = live([*MISSION[:15], *again], CAME)
+    (told,) = alerts
+    assert told.title == "GLIDERWATCH: files of unit are dated 7173 days before they came"
+    assert "kept apart" in told.body and "unit-2004-100-0" in told.body
+    assert not any(a.flag for a in store.assessments("unit"))
+    assert intake.next_tick(store, "unit", ALL, CAME[-1]) > CAME[-1] + 3 * HOUR
+
+
+def test_a_file_that_is_sent_again_days_later_is_not_told():
+    late = [t + 5 * DAY if i in (3, 20) else t for i, t in enumerate(CAME)]
+    order = sorted(range(len(late)), key=lambda i: late[i])
+    _, alerts = live([MISSION[i] for i in order], [late[i] for i in order])
+    assert not [a for a in alerts if a.kind == Kind.OPERATOR]
+
+
 def test_an_archive_read_at_the_first_start_is_no_glider_at_sea():
     old = [shifted(s, -400 * DAY) for s in MISSION]
     store, alerts = live(old, [START + 1.0 * i for i in range(len(old))])

@@ -24,6 +24,8 @@ PAUSE = 60.0
 """Seconds from the end of a segment to the opening of the next, where the step is not in whole hours."""
 LONGEST_PAUSE = 900.0
 """Seconds: a step in whole hours leaves no longer pause than this between two segments (real ones: 810)."""
+LONGEST_CALL = 3600.0
+"""Seconds of the same for a step in whole days, which is seldom met by chance."""
 LEAST_STEP = HOUR
 """Seconds: a clock that was set forward by less looks like a long call."""
 SILENT_AT_MOST = 60 * DAY
@@ -128,9 +130,20 @@ def _after(before: Stamp, offset: float, stamp: Stamp) -> Correction:
         return Correction(offset + ROLLOVER, ROLLOVER)
     if not follows:  # segments are missing: nobody knows how much time is
         return Correction(0.0, -gap)
-    hours = ceil((-gap - OVERLAP) / HOUR) * HOUR
-    step = hours if gap + hours <= LONGEST_PAUSE else PAUSE - gap
+    step = _step_back(-gap)
     return Correction(offset + step, step)
+
+
+def _step_back(overlap: float) -> float:
+    """By how much (s) a clock was set back: a segment opens ``overlap`` (s) before the end of the last one.
+
+    People set clocks by whole days and hours; between the two segments is the pause that this leaves.
+    """
+    for unit, pause in ((DAY, LONGEST_CALL), (HOUR, LONGEST_PAUSE)):
+        step = ceil((overlap - OVERLAP) / unit) * unit
+        if step - overlap <= pause:
+            return step
+    return overlap + PAUSE
 
 
 def moved(segment: Segment, offset: float) -> Segment:

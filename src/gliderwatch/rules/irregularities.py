@@ -5,16 +5,16 @@ Whoever runs gliderwatch hears of each once (`due`); `status` names those of the
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from gliderwatch.alerts import message
 from gliderwatch.alerts.words import duration, place, utc
 from gliderwatch.model import Alert, Fix, Severity
-from gliderwatch.navigation.clock import HOUR, ROLLOVER, ClockStep, span
+from gliderwatch.navigation.clock import DAY, HOUR, ROLLOVER, ClockStep, numbered, span
 from gliderwatch.navigation.fixes import FASTEST, distance
-from gliderwatch.rules.silence import GONE
+from gliderwatch.rules.silence import FRESH, GONE
 
 LEAST_STEP = 3 * HOUR
 """Seconds: a clock that was set by less is named in the notes of the dives alone."""
@@ -36,9 +36,24 @@ class Irregularity:
     text: str
 
 
-def found(glider: str, steps: Iterable[ClockStep], places: Sequence[Fix]) -> list[Irregularity]:
-    """What is wrong with the files of a glider: ``steps`` of its clock, and its last ``places`` in order."""
+@dataclass(frozen=True, slots=True)
+class Coming:
+    """A segment that ended at ``t`` by its clock (s), and of which the first file came ``at``; ``watched`` is
+    when the first file of its glider came."""
+
+    segment: str
+    t: float
+    at: float
+    watched: float
+
+
+def found(
+    glider: str, steps: Iterable[ClockStep], places: Sequence[Fix], comings: Sequence[Coming] = ()
+) -> list[Irregularity]:
+    """What is wrong with the files of a glider: ``steps`` of its clock, its last ``places`` in order, and the
+    segments that came in the last 30 days."""
     out = [_clock(step) for step in steps if abs(step.step) >= LEAST_STEP]
+    out += _old_dates(glider, comings, {numbered(step.segment)[0] for step in steps})
     other = _two_gliders(glider, places)
     return out if other is None else [*out, other]
 
@@ -96,6 +111,31 @@ def _clock(step: ClockStep) -> Irregularity:
     return Irregularity(f"clock/{step.glider}/{step.segment}/{kind}", step.t, title, text)
 
 
+def _old_dates(glider: str, comings: Sequence[Coming], known: set[str]) -> Iterator[Irregularity]:
+    """Missions that come while the glider is watched, and of which every file is days old.
+
+    After a restart with a wrong clock the numbers of segments tell nothing. Of missions with `known` steps
+    all is said.
+    """
+    missions: dict[str, list[Coming]] = {}
+    for coming in comings:
+        missions.setdefault(numbered(coming.segment)[0], []).append(coming)
+    for mission, there in missions.items():
+        first = there[0]
+        if mission in known or first.at - first.watched < DAY or any(c.at - c.t < FRESH for c in there):
+            continue
+        size = span(round((first.at - first.t) / DAY) * DAY)
+        yield Irregularity(
+            f"old-dates/{glider}/{mission}",
+            first.at,
+            f"files of {glider} are dated {size} before they came",
+            f"The first of mission {mission} came {utc(first.at)}: {first.segment}, of {utc(first.t)}. "
+            "Either the glider has a wrong clock, or somebody has put old files into its folder.\n"
+            "Its dives are kept apart, under the dates that the glider gave; the glider counts as heard.\n"
+            "What to do: set the glider's clock when it calls next. If the files are old, nothing.",
+        )
+
+
 def _why(step: float) -> str:
     if step == ROLLOVER:
         return (
@@ -117,11 +157,11 @@ def _two_gliders(glider: str, places: Sequence[Fix]) -> Irregularity | None:
     ]
     if len(there) < ALTERNATIONS:
         return None
-    (a, b), (last, _) = there[0], there[-1]
+    a, b = there[0]
     apart, between = distance(a, b) / 1000, duration(max(b.t - a.t, 60.0))
     return Irregularity(
-        f"two-gliders/{glider}/{datetime.fromtimestamp(last.t, UTC):%Y-%m}",
-        last.t,
+        f"two-gliders/{glider}/{datetime.fromtimestamp(places[-1].t, UTC):%Y-%m}",
+        a.t,
         f"files of two gliders come under the name {glider}",
         f"Its positions alternate between {place(a.lat, a.lon)} and {place(b.lat, b.lon)}, "
         f"{apart:.0f} km apart within {between}: no glider flies so fast. None of its dives can be trusted.\n"

@@ -169,10 +169,7 @@ def _speak(
         speaking.notices(glider),
         store.notes.acks(glider),
     )
-    found = irregularities.found(
-        glider, store.clock_steps(glider), store.known(glider).places(irregularities.PLACES)
-    )
-    ids, notices = irregularities.due(before.irregularities, found, now)
+    ids, notices = irregularities.due(before.irregularities, known.irregularities(now), now)
     said, alerts = replace(said, irregularities=ids), [*heard, *notices, *alerts]
     if said != before or alerts:
         store.say(glider, said, alerts, speaking.channels, now)

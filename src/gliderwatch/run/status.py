@@ -10,7 +10,6 @@ from typing import Any
 from gliderwatch.config import Config
 from gliderwatch.model import Assessment, Expected, Incident
 from gliderwatch.params import Attention
-from gliderwatch.rules import irregularities
 from gliderwatch.rules.acknowledged import Acks
 from gliderwatch.rules.irregularities import Irregularity
 from gliderwatch.rules.overdue import RECENT
@@ -128,8 +127,7 @@ def _glider(store: Store, name: str, config: Config, now: float) -> GliderStatus
         expected = guess(signs, now)
     call = awaited(expected, signs, now, attention.overdue_hours) if expected is not None else None
     configured = name in config.gliders
-    found = irregularities.found(name, store.clock_steps(name), known.places(irregularities.PLACES))
-    recent = tuple(i for i in found if now - i.t < GONE)
+    recent = tuple(i for i in known.irregularities(now) if now - i.t < GONE)
     return GliderStatus(
         name, configured, segments, dives, latest, incidents, now, attention, expected, call, acks, recent
     )

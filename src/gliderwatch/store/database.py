@@ -91,6 +91,7 @@ INSERT INTO heard_5 (glider, segment, opened_at, last_t, at)
 DROP TABLE heard;
 ALTER TABLE heard_5 RENAME TO heard;
 CREATE INDEX heard_by_segment ON heard (glider, segment);
+CREATE INDEX heard_by_arrival ON heard (glider, at);
 CREATE TABLE expected_5 (
     glider    TEXT NOT NULL,
     segment   TEXT NOT NULL,

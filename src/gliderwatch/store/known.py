@@ -5,7 +5,9 @@ from __future__ import annotations
 import sqlite3
 
 from gliderwatch.model import Assessment, Expected, Fix, Incident
-from gliderwatch.rules.silence import Sign
+from gliderwatch.rules.irregularities import PLACES, Coming, Irregularity, found
+from gliderwatch.rules.silence import GONE, Sign
+from gliderwatch.store import clocks
 from gliderwatch.store.rows import values
 
 
@@ -58,6 +60,11 @@ class Known:
         )
         return bool(self._db.execute(sql, (self.glider, since)).fetchone()[0])
 
+    def irregularities(self, now: float) -> list[Irregularity]:
+        """What is wrong with its files, as known at `now` (s)."""
+        steps = clocks.steps(self._db, self.glider)
+        return found(self.glider, steps, self.places(PLACES), self.comings(now - GONE))
+
     def places(self, n: int) -> list[Fix]:
         """Where and when it surfaced the last `n` times that are known, in order of time."""
         sql = (
@@ -66,6 +73,15 @@ class Known:
         )
         rows = self._db.execute(sql, (self.glider, n)).fetchall()
         return [Fix(*row) for row in reversed(rows) if row[1] is not None and row[2] is not None]
+
+    def comings(self, since: float) -> list[Coming]:
+        """Its segments of which the first file came at `since` (s) or later, in that order."""
+        sql = (
+            "SELECT segment, coalesce(last_t, opened_at), at, "
+            "(SELECT min(at) FROM heard WHERE glider = ?1) "
+            "FROM heard WHERE glider = ?1 AND at >= ?2 ORDER BY at"
+        )
+        return [Coming(*row) for row in self._db.execute(sql, (self.glider, since))]
 
     def signs(self, since: float) -> tuple[Sign, ...]:
         """Its files that were opened at `since` (s) or later, or that came since."""
