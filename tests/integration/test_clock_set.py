@@ -166,6 +166,17 @@ def test_an_archive_read_at_the_first_start_is_no_glider_at_sea():
 TWICE = [replace(s, id=replace(s.id, name=f"unit-2023-318-0-{i % 12}")) for i, s in enumerate(MISSION)]
 
 
+def test_old_files_that_nobody_can_read_send_no_glider_to_sea():
+    """On deck it makes files every hour; somebody puts those of last year, without their cache, beside them."""
+    store, now = Store.open(":memory:"), START + DAY
+    for k in range(8):
+        t = now - (8 - k) * HOUR
+        store.hear(SegmentId(t, "unit", f"unit-2023-319-0-{k}"), t + 60.0, t + 90.0)
+        old = now - 400 * DAY + k * 3 * HOUR
+        store.hear(SegmentId(old, "unit", f"unit-2022-280-0-{k}"), None, now - HOUR)
+    assert overdue.outlook(store.known("unit"), now) is None
+
+
 class TestOneNameTwoSegments:
     """The mission counter began again at 0 on the same day: the names of twelve segments come twice."""
 

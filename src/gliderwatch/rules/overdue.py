@@ -139,8 +139,9 @@ def next_tick(
 def outlook(known: Known, now: float) -> tuple[Expected, tuple[Sign, ...]] | None:
     """What is expected of a glider in the water at `now` (s), and its signs of life; None: nothing."""
     signs = known.signs(now - RECENT)
-    expected = known.expected(now) or guess(signs, now)
-    if expected is None or not is_launched(signs, known.has_dived(now - RECENT)):
+    recent = tuple(sign for sign in signs if sign.opened_at >= now - RECENT)
+    expected = known.expected(now) or guess(recent, now)
+    if expected is None or not is_launched(recent, known.has_dived(now - RECENT)):
         return None
     return expected, signs
 

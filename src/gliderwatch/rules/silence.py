@@ -131,7 +131,8 @@ def awaited(expected: Expected, signs: Iterable[Sign], now: float, overdue_hours
     watched = min((s.at for s in signs), default=now)
     heard = max([expected.after, *(t for t in (s.life(interval, watched) for s in signs) if t <= now)])
     t = heard + interval if heard > expected.after + interval / 2 else expected.t
-    return Awaited(heard, t, t + margin(expected, signs, now, overdue_hours), interval)
+    recent = (s for s in signs if now - s.opened_at <= GONE + FRESH)
+    return Awaited(heard, t, t + margin(expected, recent, now, overdue_hours), interval)
 
 
 def is_at_sea(signs: Iterable[Sign], interval: float, now: float) -> bool:

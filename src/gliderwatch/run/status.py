@@ -123,8 +123,9 @@ def _glider(store: Store, name: str, config: Config, now: float) -> GliderStatus
     attention = store.notes.heeded(name, config.attention(name))
     signs, acks = known.signs(now - RECENT), store.notes.acks(name)
     expected = known.expected(now)
-    if expected is None and is_launched(signs, known.has_dived(now - RECENT)):
-        expected = guess(signs, now)
+    recent_signs = [sign for sign in signs if sign.opened_at >= now - RECENT]
+    if expected is None and is_launched(recent_signs, known.has_dived(now - RECENT)):
+        expected = guess(recent_signs, now)
     call = awaited(expected, signs, now, attention.overdue_hours) if expected is not None else None
     configured = name in config.gliders
     recent = tuple(i for i in known.irregularities(now) if now - i.t < GONE)

@@ -63,7 +63,7 @@ class Known:
     def irregularities(self, now: float) -> list[Irregularity]:
         """What is wrong with its files, as known at `now` (s)."""
         steps = clocks.steps(self._db, self.glider)
-        return found(self.glider, steps, self.places(PLACES), self.comings(now - GONE))
+        return found(self.glider, steps, self.places(PLACES), self.comings(now - GONE, now))
 
     def places(self, n: int) -> list[Fix]:
         """Where and when it surfaced the last `n` times that are known, in order of time."""
@@ -74,14 +74,14 @@ class Known:
         rows = self._db.execute(sql, (self.glider, n)).fetchall()
         return [Fix(*row) for row in reversed(rows) if row[1] is not None and row[2] is not None]
 
-    def comings(self, since: float) -> list[Coming]:
-        """Its segments of which the first file came at `since` (s) or later, in that order."""
+    def comings(self, since: float, until: float) -> list[Coming]:
+        """Its segments of which the first file came between two times (s), in that order."""
         sql = (
             "SELECT segment, coalesce(last_t, opened_at), at, "
             "(SELECT min(at) FROM heard WHERE glider = ?1) "
-            "FROM heard WHERE glider = ?1 AND at >= ?2 ORDER BY at"
+            "FROM heard WHERE glider = ?1 AND at BETWEEN ?2 AND ?3 ORDER BY at"
         )
-        return [Coming(*row) for row in self._db.execute(sql, (self.glider, since))]
+        return [Coming(*row) for row in self._db.execute(sql, (self.glider, since, until))]
 
     def signs(self, since: float) -> tuple[Sign, ...]:
         """Its files that were opened at `since` (s) or later, or that came since."""
