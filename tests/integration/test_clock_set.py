@@ -167,7 +167,7 @@ TWICE = [replace(s, id=replace(s.id, name=f"unit-2023-318-0-{i % 12}")) for i, s
 
 
 def test_old_files_that_nobody_can_read_send_no_glider_to_sea():
-    """On deck it makes files every hour; somebody puts those of last year, without their cache, beside them."""
+    """On deck it makes files every hour; those of last year come too, and their cache is missing."""
     store, now = Store.open(":memory:"), START + DAY
     for k in range(8):
         t = now - (8 - k) * HOUR
