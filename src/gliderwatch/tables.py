@@ -127,6 +127,9 @@ def status(view: Overview, console: Console) -> None:
             text = f"{clean(i.glider)}: {i.kind} open since {utc(i.since)}, {i.dives} dives"
             taken_on = "" if ack is None else f", {acknowledged(ack, i)}"
             console.print(Text(text + taken_on, style=_STYLES[i.severity]))
+    for glider in view.gliders:
+        for each in glider.irregularities:
+            console.print(Text(f"since {utc(each.t)}: {clean(each.title)}", style="yellow"), soft_wrap=True)
     files(view.files, [*view.waiting, *view.quarantined], console)
     for name, link in view.links.items():
         text = f"{clean(name, 30)}: {clean(str(link), 600)} ({clean(link.cure, 600)})"
@@ -136,6 +139,11 @@ def status(view: Overview, console: Console) -> None:
         console.print(
             Text(f"gliders not in the configuration: {names} ({len(view.unknown)} files left alone)")
         )
+    _messages(view, console)
+
+
+def _messages(view: Overview, console: Console) -> None:
+    """What is held, and what no channel took."""
     for u in view.held:
         until = f"{utc(u.held_until)}{', unless acknowledged' if u.escalates else ' (quiet hours)'}"
         console.print(Text(f"held until {until}: {clean(u.alert)} by {u.channel}"), soft_wrap=True)

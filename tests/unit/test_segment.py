@@ -74,6 +74,21 @@ def test_positions_become_degrees():
     assert segment.get("fix_lon").v.tolist() == pytest.approx([179 + 59.94 / 60])
 
 
+@pytest.mark.parametrize(
+    ("sensors", "name"),
+    [("m_gps_lat m_gps_lon", "fix"), ("m_lat m_lon", "dr"), ("c_wpt_lat c_wpt_lon", "waypoint")],
+)
+@pytest.mark.parametrize(
+    ("raw", "lon"), [(18001.4865, -179.975225), (-18001.4865, 179.975225), (35959.4, -0.01), (36000.0, 0.0)]
+)
+def test_a_longitude_beyond_the_antimeridian_comes_back(sensors, name, raw, lon):
+    lat_name, lon_name = sensors.split()
+    segment = build(**{lat_name: (times(3), [-1722.0] * 3), lon_name: (times(3), [17958.0, raw, raw])})
+    assert segment.get(f"{name}_lon").v.tolist() == pytest.approx([179 + 58 / 60, lon, lon])
+    assert segment.notes == (f"2 values of {name}_lon beyond 180 degrees brought back to -180 to 180",)
+    assert not segment.dropped
+
+
 def test_no_fix_is_no_value_and_not_an_error():
     segment = build(
         m_gps_lat=(times(4), [3823.0, 69696969.0, 0.0, 3824.0]),

@@ -149,11 +149,12 @@ def build_segment(
     opened, samples = header.id.opened_at, _with_depth(samples)
     window = (max(opened - _BEFORE, _EARLIEST), opened + _AFTER)
     quantities: dict[str, Series] = {}
-    dropped = {"bytes": damaged}
+    dropped, notes = {"bytes": damaged}, list[str]()
     for rows in _GROUPS:
-        kept, lost = _clean(rows, samples, window)
+        kept, lost, corrected = _clean(rows, samples, window)
         quantities |= kept
         dropped |= lost
+        notes += corrected
     declination, source = _declination(quantities)
     cycles = samples[TIME][0] if TIME in samples else np.empty(0)
     ends = [series.t[-1] for series in quantities.values()]
@@ -168,6 +169,7 @@ def build_segment(
         declination=declination,
         declination_source=source,
         dropped={name: n for name, n in dropped.items() if n},
+        notes=tuple(notes),
     )
 
 
@@ -202,14 +204,14 @@ def depth_of(bar: Array) -> Array:
 
 def _clean(
     rows: tuple[Quantity, ...], samples: Samples, window: tuple[float, float]
-) -> tuple[dict[str, Series], dict[str, int]]:
-    """The good samples of one quantity or of a pair, and how many were dropped of each."""
+) -> tuple[dict[str, Series], dict[str, int], list[str]]:
+    """The good samples of one quantity or of a pair, how many were dropped of each, and notes."""
     found = [
         next((samples[s] for s in row.sensors if s in samples and len(samples[s][0])), None) for row in rows
     ]
     raw = [each for each in found if each is not None]
     if len(raw) < len(rows):
-        return {}, {}
+        return {}, {}, []
     t, columns = _together(raw)
     with np.errstate(all="ignore"):
         absent = reduce(or_, [v == row.absent for row, v in zip(rows, columns, strict=True)])
@@ -217,6 +219,7 @@ def _clean(
             absent |= reduce(and_, [v == 0.0 for v in columns])
         values = [row.to_si(v) for row, v in zip(rows, columns, strict=True)]
         good = _within(t, *window) & ~absent
+        values, far = _wrapped(rows, values)
         for row, v in zip(rows, values, strict=True):
             good &= _within(v, row.low, row.high)
     at = np.flatnonzero(good)
@@ -226,9 +229,24 @@ def _clean(
     wanted = len(times) + int(np.count_nonzero(absent))
     lost = {row.name: len(each[0]) - wanted for row, each in zip(rows, raw, strict=True)}
     if not len(times):
-        return {}, lost
+        return {}, lost, []
     kept = {row.name: Series(times, readonly(v[at])) for row, v in zip(rows, values, strict=True)}
-    return kept, lost
+    n = int(np.count_nonzero(far & good))
+    notes = [f"{n} values of {rows[-1].name} beyond 180 degrees brought back to -180 to 180"] if n else []
+    return kept, lost, notes
+
+
+def _wrapped(rows: tuple[Quantity, ...], values: list[Array]) -> tuple[list[Array], NDArray[np.bool_]]:
+    """The values with longitudes of up to a turn brought back to -180 to 180, and where those were beyond.
+
+    A glider counts on as it crosses the antimeridian.
+    """
+    far = np.zeros(len(values[0]), dtype=np.bool_)
+    if rows[0].slocum_unit != _POSITION:
+        return values, far
+    lat, lon = values
+    far = (np.abs(lon) > 180.0) & (np.abs(lon) <= 360.0)
+    return [lat, np.where(far, lon - np.copysign(360.0, lon), lon)], far
 
 
 def _together(raw: list[tuple[Array, Array]]) -> tuple[Array, list[Array]]:

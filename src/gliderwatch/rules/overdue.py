@@ -73,7 +73,7 @@ class Known(Protocol):
         """Whether a dive began at `since` (s) or later, also one that has not ended or cannot be used."""
 
     def signs(self, since: float) -> tuple[Sign, ...]:
-        """Its files that were opened at `since` (s) or later."""
+        """Its files that were opened at `since` (s) or later, or that came since."""
 
 
 def hear(silences: tuple[Silence, ...], known: Known, now: float) -> tuple[tuple[Silence, ...], list[Alert]]:
@@ -172,8 +172,9 @@ def _patience(silence: Silence, back: float | None) -> float:
 def outlook(known: Known, now: float) -> tuple[Expected, tuple[Sign, ...]] | None:
     """What is expected of a glider in the water at `now` (s), and its signs of life; None: nothing."""
     signs = known.signs(now - RECENT)
-    expected = known.expected(now) or guess(signs, now)
-    if expected is None or not is_launched(signs, known.has_dived(now - RECENT)):
+    recent = tuple(sign for sign in signs if sign.opened_at >= now - RECENT)
+    expected = known.expected(now) or guess(recent, now)
+    if expected is None or not is_launched(recent, known.has_dived(now - RECENT)):
         return None
     return expected, signs
 

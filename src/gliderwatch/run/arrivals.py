@@ -134,7 +134,7 @@ def _gone(before: File | None, store: Store, is_known: Callable[[str], bool]) ->
         return None
     if before.status == Status.UNKNOWN and not is_known(before.glider):
         return None
-    if store.segments.completeness(before.glider, before.segment) is None:
+    if not store.segments.is_held(before.glider, before.segment):
         reason = "is not there any more, and its segment has not come under another name"
         return replace(before, status=Status.WAITING, reason=reason, crc="", hindrance=Hindrance.GONE)
     return replace(before, status=Status.DUPLICATE, reason="was renamed", crc="", hindrance=Hindrance.RENAMED)

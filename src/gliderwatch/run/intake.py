@@ -11,7 +11,7 @@ from gliderwatch.errors import GliderwatchError, NotAssessed
 from gliderwatch.model import Alert, Assessment, Segment, SegmentId
 from gliderwatch.params import Attention, GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
-from gliderwatch.rules import overdue, silence, unknown
+from gliderwatch.rules import irregularities, overdue, silence, unknown
 from gliderwatch.rules.announce import due
 from gliderwatch.rules.muting import with_mute
 from gliderwatch.rules.waiting import AT_ONCE, Wait
@@ -63,7 +63,7 @@ def take(
     glider = segment.id.glider
     with store.transaction():
         store.hear(segment.id, segment.last_t, now)
-        known = store.segments.completeness(glider, segment.id.name)
+        known = store.segments.completeness(segment.id)
         if known is not None and known >= segment.completeness:
             file = replace(file, status=Status.DUPLICATE, reason="this segment is known from a fuller copy")
             store.note(file, now)
@@ -217,7 +217,9 @@ def _speak(
         store.notes.acks(glider),
     )
     blind, more = unknown.announce(said.unknown, known, attention, params.rules.reminder_hours, now)
-    said, alerts = replace(said, unknown=blind), [*heard, *alerts, *more]
+    ids, notices = irregularities.due(before.irregularities, known.irregularities(now), now)
+    said = replace(said, unknown=blind, irregularities=ids)
+    alerts = [*heard, *notices, *alerts, *more]
     if said != before or alerts:
         post_alerts(store, glider, said, alerts, _channels(store, before.silences, speaking), now)
     return tuple(alerts)

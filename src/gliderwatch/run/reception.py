@@ -183,7 +183,7 @@ class Reception:
     def _gave_no_more(self, file: File, segment: Segment) -> bool:
         """Whether a file that was looked at anew, for what lies beside it, gave no more than before."""
         before = self._store.file(file.path)
-        held = self._store.segments.completeness(segment.id.glider, segment.id.name)
+        held = self._store.segments.completeness(segment.id)
         return (
             before is not None
             and before.status == Status.TAKEN

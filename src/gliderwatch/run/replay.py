@@ -20,6 +20,7 @@ from gliderwatch.ingest.decode import Decoder
 from gliderwatch.ingest.header import read_header
 from gliderwatch.ingest.lists import SensorLists, lists_folder
 from gliderwatch.model import Alert, Hindrance, Segment
+from gliderwatch.navigation.clock import Stamp, corrections, is_same, numbered
 from gliderwatch.params import GliderParams
 from gliderwatch.rules.silence import GONE
 from gliderwatch.run import arrivals, intake
@@ -232,13 +233,32 @@ def _triage(
     for file in waiting:
         look(Path(file.path))
     for found in noted:
-        if (
-            found.hindrance is Hindrance.NO_CACHE
-        ):  # a sign of life of its time: it has its turn with the others
+        if found.hindrance is Hindrance.NO_CACHE:  # a sign of life: it has its turn with the others
             jobs.append(Job(found, read_header(Path(found.path)), MissingCache(found.crc, caches)))
         else:
             _note(found, report, request, on_file)
-    return sorted(jobs, key=lambda j: (j.header.id, -names.rank(j.header.kind), j.file.path))
+    _correct_clocks(jobs)
+    return sorted(jobs, key=lambda j: (j.opened_at, j.header.id, -names.rank(j.header.kind), j.file.path))
+
+
+def _correct_clocks(jobs: Sequence[Job]) -> None:
+    """Give the files of a glider whose clock fell back their turn: when they were sent, not years before."""
+    missions: dict[tuple[str, str], dict[str, list[list[Job]]]] = {}
+    for job in jobs:
+        mission = job.header.id.glider, numbered(job.header.id.name)[0]
+        segments = missions.setdefault(mission, {}).setdefault(job.header.id.name, [])
+        copies = next((s for s in segments if is_same(s[0].header.id, job.header.id)), None)
+        if copies is None:
+            segments.append([job])
+        else:
+            copies.append(job)
+    for by_name in missions.values():
+        segments = [copies for found in by_name.values() for copies in found]
+        opened = [(copies[0].header.id.name, copies[0].header.id.opened_at) for copies in segments]
+        stamps = [Stamp(numbered(name)[1], t, t) for name, t in opened]
+        for copies, correction in zip(segments, corrections(stamps), strict=True):
+            for job in copies:
+                job.offset = correction.offset
 
 
 def _note(file: File, report: Report, request: Request, on_file: Callable[[intake.Taken], None]) -> None:

@@ -11,6 +11,7 @@ from gliderwatch.config import Config, Link, linked_gliders
 from gliderwatch.model import Assessment, Expected, Incident
 from gliderwatch.params import Attention
 from gliderwatch.rules.acknowledged import Acks
+from gliderwatch.rules.irregularities import Irregularity
 from gliderwatch.rules.muting import with_mute
 from gliderwatch.rules.overdue import RECENT
 from gliderwatch.rules.silence import GONE, Awaited, awaited, guess, is_launched
@@ -28,7 +29,7 @@ class GliderStatus:
     """One glider: its last dive that ended, the open incidents, how many segments and dives are known.
 
     ``expected`` and ``awaited``: the next surfacing, as known ``at`` a time (s). ``acks``: who has taken
-    incidents on.
+    incidents on. ``irregularities`` of its files in the last 30 days.
     """
 
     name: str
@@ -42,6 +43,7 @@ class GliderStatus:
     expected: Expected | None = None
     awaited: Awaited | None = None
     acks: Acks = field(default_factory=dict)
+    irregularities: tuple[Irregularity, ...] = ()
 
     @property
     def is_over(self) -> bool:
@@ -128,12 +130,14 @@ def _glider(store: Store, name: str, config: Config, now: float) -> GliderStatus
     attention = with_mute(config.attention(name), store.notes.muted_until(name))
     signs, acks = known.signs(now - RECENT), store.notes.acks(name)
     expected = known.expected(now)
-    if expected is None and is_launched(signs, known.has_dived(now - RECENT)):
-        expected = guess(signs, now)
+    recent_signs = [sign for sign in signs if sign.opened_at >= now - RECENT]
+    if expected is None and is_launched(recent_signs, known.has_dived(now - RECENT)):
+        expected = guess(recent_signs, now)
     call = awaited(expected, signs, now, attention.overdue_hours) if expected is not None else None
     configured = name in config.gliders
+    recent = tuple(i for i in known.irregularities(now) if now - i.t < GONE)
     return GliderStatus(
-        name, configured, segments, dives, latest, incidents, now, attention, expected, call, acks
+        name, configured, segments, dives, latest, incidents, now, attention, expected, call, acks, recent
     )
 
 
@@ -149,6 +153,7 @@ def as_json(view: Overview) -> dict[str, Any]:
                 "dives": g.dives,
                 "latest": assessment_line(g.latest) if g.latest is not None else None,
                 "incidents": [_incident(i, g.acks) for i in g.incidents],
+                "irregularities": [{"since": iso(i.t), "title": i.title} for i in g.irregularities],
                 **_silence(g),
             }
             for g in view.gliders

@@ -27,7 +27,7 @@ __all__ = [
     "schema",
 ]
 
-SCHEMA = 5
+SCHEMA = 6
 DELIVERY_BY_WORDS = """CASE
     WHEN delivered_at IS NULL THEN 'pending' WHEN error = '' THEN 'delivered'
     WHEN error LIKE 'withdrawn: %' THEN 'withdrawn' WHEN error LIKE 'given up: %' THEN 'unreadable'
@@ -85,6 +85,57 @@ UPDATE files SET hindrance = CASE WHEN status = 'duplicate' AND reason = 'was re
     WHEN status = 'quarantined' AND reason LIKE 'cannot be assessed%' THEN 'not_assessed'
     WHEN status = 'quarantined' THEN 'damaged' ELSE '' END;
 CREATE INDEX files_by_segment ON files (glider, segment);
+""",
+    6: """
+CREATE TABLE segments_6 (
+    glider       TEXT NOT NULL,
+    opened_at    REAL NOT NULL,        -- as corrected: the glider's clock and clock_offset
+    name         TEXT NOT NULL,        -- not unique: a mission counter may begin again
+    completeness TEXT NOT NULL,
+    milestone    INTEGER NOT NULL,     -- 1 where the checkpoint is kept for good
+    last_t       REAL NOT NULL,        -- its last sample, by the glider's clock
+    clock_offset REAL NOT NULL DEFAULT 0,  -- added to the glider's clock (s)
+    clock_step   REAL NOT NULL DEFAULT 0,  -- by how much that was set back before it (s; 0: not)
+    segment      BLOB NOT NULL,        -- its times are those of the glider's clock
+    checkpoint   BLOB,                 -- NULL where thinned out: the next older one is gone on from
+    PRIMARY KEY (glider, opened_at, name)
+) STRICT;
+INSERT INTO segments_6 (glider, opened_at, name, completeness, segment, checkpoint, milestone, last_t)
+    SELECT s.glider, s.opened_at, s.name, s.completeness, s.segment, s.checkpoint, s.milestone,
+        coalesce(h.last_t, s.opened_at)
+    FROM segments s LEFT JOIN heard h ON h.glider = s.glider AND h.segment = s.name;
+DROP TABLE segments;
+ALTER TABLE segments_6 RENAME TO segments;
+CREATE INDEX segments_by_name ON segments (glider, name);
+CREATE INDEX segments_to_resume_from ON segments (glider, opened_at, name) WHERE checkpoint IS NOT NULL;
+CREATE INDEX segments_with_step ON segments (glider) WHERE clock_step != 0;
+CREATE TABLE heard_6 (
+    glider       TEXT NOT NULL,
+    segment      TEXT NOT NULL,
+    opened_at    REAL NOT NULL,        -- as corrected
+    last_t       REAL,                 -- as corrected; NULL where it is not read
+    at           REAL NOT NULL,
+    clock_offset REAL NOT NULL DEFAULT 0,
+    PRIMARY KEY (glider, opened_at, segment)
+) STRICT;
+INSERT INTO heard_6 (glider, segment, opened_at, last_t, at)
+    SELECT glider, segment, opened_at, last_t, at FROM heard;
+DROP TABLE heard;
+ALTER TABLE heard_6 RENAME TO heard;
+CREATE INDEX heard_by_segment ON heard (glider, segment);
+CREATE INDEX heard_by_arrival ON heard (glider, at);
+CREATE TABLE expected_6 (
+    glider    TEXT NOT NULL,
+    segment   TEXT NOT NULL,
+    opened_at REAL NOT NULL,
+    after     REAL NOT NULL,
+    data      TEXT NOT NULL,
+    PRIMARY KEY (glider, opened_at, segment)
+) STRICT;
+INSERT INTO expected_6 SELECT glider, segment, opened_at, after, data FROM expected;
+DROP TABLE expected;
+ALTER TABLE expected_6 RENAME TO expected;
+CREATE INDEX expected_in_order ON expected (glider, after, opened_at);
 """,
 }
 """SQL that leads from the schema before to the one of the key. It may call the functions of

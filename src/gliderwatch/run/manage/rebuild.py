@@ -123,11 +123,9 @@ def _turn(step: tuple[SegmentId, Job | None]) -> tuple[SegmentId, int, str]:
 
 def _fuller(work: _Work, identity: SegmentId) -> Segment | None:
     """The segment held, if it holds more than the files that are still there."""
-    there = work.new.segments.completeness(identity.glider, identity.name)
-    held = work.old.segments.completeness(identity.glider, identity.name)
-    if held is None or (there is not None and there >= held):
-        return None
-    return work.old.segments.get(identity)
+    segment = work.old.segments.as_sent(identity)
+    there = work.new.segments.completeness(segment.id)
+    return None if there is not None and there >= segment.completeness else segment
 
 
 def _take(work: _Work, file: File, segment: Segment | GliderwatchError, following: int, ocean: Ocean) -> None:
