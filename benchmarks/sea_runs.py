@@ -89,7 +89,7 @@ class Message:
 @dataclass(frozen=True)
 class Result:
     """What came of one glider. Times in hours since the start, but for ``start`` (s). Processor time (s) a
-    dive: ``cost`` of `pipeline.process` alone (0: not measured), ``cpu`` of all, store and messages included."""
+    dive: ``cost`` of `pipeline.process` alone (0: not measured), ``cpu`` of all, the store included."""
 
     sea: str
     seed: int

@@ -40,9 +40,9 @@ _INCIDENTS = (Kind.ANOMALY, Kind.FALSE_ALARM)
 
 @dataclass(frozen=True)
 class Healthy:
-    """What is said of healthy gliders in one kind of sea. Messages are per glider-month, ``unknown`` of them
-    that nothing could be judged, ``all_kinds`` all; ``judged`` is the part of dives with a flag, ``rms`` (m/s)
-    and ``inside`` (part in the 95 % interval) of speeds from day 3; ``miss`` (km) and ``covered`` of the
+    """What is said of healthy gliders in one kind of sea. Messages are per glider-month, ``unknown`` of
+    them that nothing could be judged, ``all_kinds`` all; ``judged`` is the part of dives with a flag, ``rms``
+    (m/s) and ``inside`` (part in the 95 % interval) of speeds from day 3; ``miss`` (km) and ``covered`` of the
     ``forecasts`` of dives of three hours, ``late_covered`` of their times; ``cost`` (ms) a dive."""
 
     sea: str
@@ -63,8 +63,8 @@ class Healthy:
 
 @dataclass(frozen=True)
 class Faulty:
-    """What is said of a fault in one kind of sea. ``told`` is the part told as what it is within 15 days by an
-    incident that opens, ``otherwise`` that told as something else at any time; ``delay`` (h, median, infinite
+    """What is said of a fault in one kind of sea. ``told`` is the part told as what it is within 15 days, by
+    an incident that opens, ``otherwise`` that told as something else at any time; ``delay`` (h, median, infinite
     where most are not told); messages in two days and in fifteen: mean and most."""
 
     sea: str
@@ -175,9 +175,7 @@ def tables(results: Sequence[Result]) -> tuple[list[Healthy], list[Faulty]]:
 def shown(well: Sequence[Healthy], ill: Sequence[Faulty]) -> Iterator[str]:
     """The tables as lines."""
     yield "healthy, messages a glider-month; speed and forecasts (dives of 3 h) from day 3"
-    yield (
-        f"{'sea':12s} months anomal flag2 unknwn    all judged  rms cm/s in95   n3h miss km  cover time ms/dive"
-    )
+    yield f"{'sea':12s} months anomal flag2 unknwn    all judged  rms cm/s in95   n3h miss km  cover time ms"
     for h in well:
         yield (
             f"{h.sea:12s} {h.months:6.1f} {h.anomalies:6.2f} {h.false_alarms:5.2f} {h.unknown:6.2f} "
