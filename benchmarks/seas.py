@@ -40,10 +40,13 @@ _INCIDENTS = (Kind.ANOMALY, Kind.FALSE_ALARM)
 
 @dataclass(frozen=True)
 class Healthy:
-    """What is said of healthy gliders in one kind of sea. Messages are per glider-month, ``unknown`` of
-    them that nothing could be judged, ``all_kinds`` all; ``judged`` is the part of dives with a flag, ``rms``
-    (m/s) and ``inside`` (part in the 95 % interval) of speeds from day 3; ``miss`` (km) and ``covered`` of the
-    ``forecasts`` of dives of three hours, ``late_covered`` of their times; ``cost`` (ms) a dive."""
+    """What is said of healthy gliders in one kind of sea.
+
+    Messages are per glider-month: ``unknown`` those that nothing could be judged, ``all_kinds`` all.
+    ``judged`` is the part of dives with a flag; ``rms`` (m/s) and ``inside`` (part in the 95 % interval) are
+    of speeds from day 3; ``miss`` (km) and ``covered`` of the places, ``late_covered`` of the times in the
+    ``forecasts`` of dives of three hours. ``cost`` (ms) is of a dive.
+    """
 
     sea: str
     months: float
@@ -63,9 +66,12 @@ class Healthy:
 
 @dataclass(frozen=True)
 class Faulty:
-    """What is said of a fault in one kind of sea. ``told`` is the part told as what it is within 15 days, by
-    an incident that opens, ``otherwise`` that told as something else at any time; ``delay`` (h, median, infinite
-    where most are not told); messages in two days and in fifteen: mean and most."""
+    """What is said of a fault in one kind of sea.
+
+    ``told`` is the part told as what it is within 15 days, by an incident that opens, ``otherwise`` the part
+    told as something else (as well); ``delay`` (h) is the median, infinite where most are not told. Of the
+    messages in two days and in fifteen the mean and the most.
+    """
 
     sea: str
     fault: str
