@@ -8,6 +8,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import msgspec
@@ -131,6 +132,7 @@ def flight(job: Job) -> Flight:
     return made
 
 
+@cache
 def _sources() -> str:
     """A hash of all that makes the segments: the simulator, the decoder and the shape of a segment."""
     root, digest = Path(gliderwatch.__file__).parent, hashlib.sha256()
