@@ -181,19 +181,19 @@ def tables(results: Sequence[Result]) -> tuple[list[Healthy], list[Faulty]]:
 def shown(well: Sequence[Healthy], ill: Sequence[Faulty]) -> Iterator[str]:
     """The tables as lines."""
     yield "healthy, messages a glider-month; speed and forecasts (dives of 3 h) from day 3"
-    yield f"{'sea':12s} months anomal flag2 unknwn    all judged  rms cm/s in95   n3h miss km  cover time ms"
+    yield f"{'sea':13s} months anomal flag2 unknwn    all judged  rms cm/s in95   n3h miss km  cover time ms"
     for h in well:
         yield (
-            f"{h.sea:12s} {h.months:6.1f} {h.anomalies:6.2f} {h.false_alarms:5.2f} {h.unknown:6.2f} "
+            f"{h.sea:13s} {h.months:6.1f} {h.anomalies:6.2f} {h.false_alarms:5.2f} {h.unknown:6.2f} "
             f"{h.all_kinds:6.2f} {_part(h.judged)} {100 * h.rms:9.2f} {_part(h.inside)} {h.forecasts:5d} "
             f"{h.miss:7.2f}  {_part(h.covered)} {_part(h.late_covered)} {h.cost:7.1f}"
         )
     yield ""
     yield "fault on day 6: told as what it is within 15 days, median delay; told as something else; messages"
-    yield f"{'sea':12s} {'fault':10s}  n  told  delay h other  48 h mean most  15 d mean most"
+    yield f"{'sea':13s} {'fault':10s}  n  told  delay h other  48 h mean most  15 d mean most"
     for f in ill:
         yield (
-            f"{f.sea:12s} {f.fault:10s} {f.gliders:2d} {_part(f.told)} {f.delay:8.1f} {_part(f.otherwise)} "
+            f"{f.sea:13s} {f.fault:10s} {f.gliders:2d} {_part(f.told)} {f.delay:8.1f} {_part(f.otherwise)} "
             f"{f.two_days:9.1f} {f.two_days_most:4d} {f.fifteen_days:10.1f} {f.fifteen_days_most:4d}"
         )
 

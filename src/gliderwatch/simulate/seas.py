@@ -113,7 +113,7 @@ SEAS: Mapping[str, SeaKind] = {
         latitude=(20.0, 55.0),
         both=True,
     ),
-    "deep": SeaKind(
+    "deep-inertial": SeaKind(
         "dives to 1000 m, with inertial motion above",
         m2=(0.01, 0.05),
         m2_ratio=(0.2, 0.8),
