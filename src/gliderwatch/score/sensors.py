@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from gliderwatch.ingest.segment import declination_of
+from gliderwatch.ingest.segment import QUANTITIES, declination_of
 from gliderwatch.model import Segment
 
 _HEADING = ("heading",)
@@ -56,3 +56,10 @@ def is_sent(segments: Iterable[Segment], quantities: Iterable[str]) -> bool:
     """Whether any of some quantities is in any of the segments; True where none is asked for."""
     wanted = frozenset(quantities)
     return not wanted or any(wanted & segment.quantities.keys() for segment in segments)
+
+
+def cadence_without(cadence: Mapping[str, float], quantities: Iterable[str]) -> dict[str, float]:
+    """A simulated glider's list of Slocum sensors (s) without those that some quantities are read from."""
+    gone = frozenset(quantities)
+    sensors = {sensor for row in QUANTITIES if row.name in gone for sensor in row.sensors}
+    return {name: period for name, period in cadence.items() if name not in sensors}

@@ -194,9 +194,9 @@ def sea_mission(name: str, seed: int, *, days: float = 30.0) -> Scenario:
     )
 
 
-def with_fault(scenario: Scenario, fault: Fault, days: float) -> Scenario:
-    """The same mission with a fault, cut to some days; all is the same until the fault begins."""
-    return replace(scenario, faults=(fault,), days=days)
+def with_fault(scenario: Scenario, fault: Fault) -> Scenario:
+    """The same mission with a fault; all is the same until the fault begins."""
+    return replace(scenario, faults=(fault,))
 
 
 # --------------------------------------------------------------------------- what is drawn
