@@ -124,7 +124,8 @@ def _by_sea(scores: Sequence[FaultScore], title: str) -> Iterator[Table]:
 def _detected(score: FaultScore) -> str:
     if score.detected is None:
         return "-"
-    return f"{100 * score.detected.value:.0f}% {_count(score.hours_median)} h"
+    hours = f" {score.hours_median:.0f} h" if math.isfinite(score.hours_median) else ""
+    return f"{100 * score.detected.value:.0f}%{hours}"
 
 
 def _false(scores: Iterable[FalseScore], title: str) -> Table:
