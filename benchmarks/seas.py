@@ -69,8 +69,9 @@ class Faulty:
     """What is said of a fault in one kind of sea.
 
     ``told`` is the part told as what it is within 15 days, by an incident that opens, ``otherwise`` the part
-    told as something else (as well); ``delay`` (h) is the median, infinite where most are not told. Of the
-    messages in two days and in fifteen the mean and the most.
+    told as something else (as well); ``delay`` (h) is the median, infinite where most are not told. An
+    incident that was open before by mistake, and hides the fault, does not count. Of the messages in two days
+    and in fifteen the mean and the most.
     """
 
     sea: str
