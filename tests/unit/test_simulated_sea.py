@@ -29,7 +29,7 @@ def uniform(sea: Ocean, t: np.ndarray, depth: float = 0.0) -> tuple[np.ndarray, 
 
 @pytest.mark.parametrize(
     ("constituent", "hours"),
-    [("M2", 12.4206), ("S2", 12.0), ("N2", 12.6583), ("K1", 23.9345), ("O1", 25.8193)],
+    [("M2", 12.4206), ("S2", 12.0), ("N2", 12.6583), ("K1", 23.9345), ("O1", 25.8193), ("M4", 6.2103)],
 )
 def test_each_tide_has_its_period(constituent: str, hours: float) -> None:
     tide = Ellipse(Constituent(constituent), major=0.3)
@@ -39,6 +39,15 @@ def test_each_tide_has_its_period(constituent: str, hours: float) -> None:
     rises = t[1:][(u[:-1] < 0) & (u[1:] >= 0)]
     assert np.diff(rises).mean() / 3600 == pytest.approx(hours, abs=0.02)
     assert u.max() == pytest.approx(0.3, abs=1e-3)
+
+
+def test_a_tide_comes_later_and_stronger_along_its_way() -> None:
+    tide = Ellipse(Constituent.M2, major=0.3, minor=0.1, lag=(1e-5, 0.0), growth=(0.0, 1e-6))
+    t, zero = np.arange(0.0, 2 * DAY, 60.0), np.zeros(2880)
+    here, east, north = (tide.current(t, zero + e, zero + n) for e, n in ((0, 0), (20e3, 0), (0, 100e3)))
+    late = round(0.2 / Constituent.M2.frequency / 60)  # 20 km of 1e-5 rad/m, in minutes
+    assert np.abs(east[0][late:] - here[0][:-late]).max() < 0.003
+    assert np.hypot(*north) == pytest.approx(np.exp(np.tanh(0.1)) * np.hypot(*here))
 
 
 def test_shear_takes_the_slow_current_away_with_depth_and_leaves_the_tide() -> None:

@@ -155,7 +155,7 @@ def build_segment(
         quantities |= kept
         dropped |= lost
         notes += corrected
-    declination, source = _declination(quantities)
+    declination, source = declination_of(quantities)
     cycles = samples[TIME][0] if TIME in samples else np.empty(0)
     ends = [series.t[-1] for series in quantities.values()]
     ends += cycles[_within(cycles, *window)].tolist()
@@ -268,7 +268,7 @@ def _within(values: Array, low: float, high: float) -> NDArray[np.bool_]:
 # --------------------------------------------------------------------------- declination
 
 
-def _declination(quantities: Mapping[str, Series]) -> tuple[float | None, str]:
+def declination_of(quantities: Mapping[str, Series]) -> tuple[float | None, str]:
     """Declination (rad, east positive) that the glider reports, else the model's at its first position."""
     if "magnetic_variation" in quantities:
         variation = quantities["magnetic_variation"].v
