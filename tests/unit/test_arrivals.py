@@ -172,7 +172,7 @@ def test_a_waiting_file_that_was_renamed_and_taken_then_is_done_with(
 ) -> None:
     noted(path, store)
     another = path.rename(path.with_name("another.sbd"))
-    monkeypatch.setattr(Segments, "completeness", lambda self, glider, name: (0, 1, ""))
+    monkeypatch.setattr(Segments, "is_held", lambda self, glider, name: True)
     assert noted(path, store).status == Status.DUPLICATE
     assert judge(path, store) is None
     another.rename(path)  # it had only been away: what is known of its segment may be less than it holds
