@@ -68,7 +68,6 @@ class Header:
     factored: bool
     n_sensors: int
     n_held: int
-    eightthree: str
     length: int
 
 
@@ -179,7 +178,6 @@ def parse_header(data: bytes) -> Header:
         factored=tags["sensor_list_factored"] == "1",
         n_sensors=n_sensors,
         n_held=n_held,
-        eightthree=tags["the8x3_filename"].lower(),
         length=length,
     )
 
