@@ -216,7 +216,10 @@ def test_every_shipped_preset_loads(write: Write) -> None:
     assert presets_path() == EXAMPLE.with_name("presets.yml")
     config = load(write(MINIMAL + "defaults: {preset: franklin}\n"))
     assert set(config._presets) == {"franklin", "usf-sam", "usf-gansett", "usf-stella"}
-    assert (config.glider("never-heard-of").speed_min, config.glider("never-heard-of").speed_max) == (0.15, 0.25)
+    assert (config.glider("never-heard-of").speed_min, config.glider("never-heard-of").speed_max) == (
+        0.15,
+        0.25,
+    )
 
 
 def test_locate_gives_the_line_of_a_key_or_of_what_it_belongs_to(write: Write) -> None:
