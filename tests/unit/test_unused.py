@@ -8,7 +8,7 @@ SRC = Path(__file__).parents[2] / "src" / "gliderwatch"
 ALLOWED = {
     "low_pass_both_ways": "the delayed mode of paper 002",
     "AdaptiveInfo.n_steps": "tests count the substeps of a dive by it",
-    "Assessment.parameters": "written into the state file, for who reads it later",
+    "Assessment.parameters": "in every assessment that is written out: the hash of what was used",
     "_Warnings.emit": "logging calls it",
     "_Handler.on_any_event": "watchdog calls it",
 }
