@@ -27,7 +27,6 @@ def test_what_a_header_holds(read):
     assert header.id == SegmentId(dinkum.OPENED_AT, "usf-sam", "USF-Sam-2024-250-1-3")
     assert (header.mission, header.kind, header.crc) == ("test.mi", "sbd", "0abc12ef")
     assert (header.factored, header.n_held, header.n_sensors) == (True, 12, 13)
-    assert header.eightthree == "00010003"
 
 
 def test_the_header_of_a_compressed_file_whatever_its_name(read):

@@ -76,7 +76,6 @@ class Header:
     factored: bool
     n_sensors: int
     n_held: int
-    eightthree: str
     length: int
 
 
@@ -189,7 +188,6 @@ def parse_header(data: bytes, *, science: bool = False) -> Header:
         factored=tags["sensor_list_factored"] == "1",
         n_sensors=n_sensors,
         n_held=n_held,
-        eightthree=tags["the8x3_filename"].lower(),
         length=length,
     )
 
