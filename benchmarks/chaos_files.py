@@ -23,8 +23,8 @@ from common import machine
 from acceptance.angus import FILES, angus
 from acceptance.hostile import fill, peak, program, shown, workers
 from acceptance.support import Daemon, Site, command, remora, results
-from gliderwatch.simulate.dockserver import Arrival, arrivals
-from gliderwatch.store.sqlite import Status
+from gliderwatch.simulate.delivery import Arrival, arrivals
+from gliderwatch.store.state_file import Status
 
 _PATIENCE = 1800.0
 _TOO_MUCH = 500.0

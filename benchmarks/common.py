@@ -20,7 +20,7 @@ FLOOR = """
 import sys, time
 from pathlib import Path
 import dbdreader
-from gliderwatch.ingest.segment import SENSORS
+from gliderwatch.slocum.sensors import SENSORS
 begun, n = time.process_time(), 0
 for path in sorted(Path(sys.argv[1]).rglob("*.?bd")):
     file = dbdreader.DBD(str(path), cacheDir=sys.argv[2])

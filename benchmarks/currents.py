@@ -19,15 +19,15 @@ import numpy as np
 from common import machine
 from flights import HOUR, SEAS, judged, navigated, of, read
 
-from gliderwatch.currents import augmented, two_stage
-from gliderwatch.currents.augmented import Parameters
-from gliderwatch.currents.constituents import Constituent
-from gliderwatch.currents.state import Currents, displacement, forecasts, learn, predict
-from gliderwatch.currents.two_stage import TwoStageParams
-from gliderwatch.estimation.observation import observe
+from gliderwatch.estimation.dive_measurement import observe
 from gliderwatch.model import Array, Dive, readonly
+from gliderwatch.papers import two_stage
+from gliderwatch.papers.two_stage import TwoStageParams
+from gliderwatch.sea import flow_forecast
+from gliderwatch.sea.flow_forecast import Currents, Parameters, displacement, forecasts, learn, predict
+from gliderwatch.sea.tides import Constituent
 from gliderwatch.simulate import ocean
-from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.ocean import Ellipse, Sea
 from gliderwatch.simulate.scenario import Scenario
@@ -134,9 +134,9 @@ class Fixed:
         self.belief = None
 
     def __call__(self, each: Seen) -> Array:
-        belief = self.belief if self.belief is not None else augmented.init(each.start, FIXED)
+        belief = self.belief if self.belief is not None else flow_forecast.init_belief(each.start, FIXED)
         step = (max(each.start, belief.t), each.end, each.current, each.sigma)
-        self.belief, told = augmented.learn(belief, *step, FIXED)
+        self.belief, told = flow_forecast.learn_belief(belief, *step, FIXED)
         return told.mean[0]
 
 

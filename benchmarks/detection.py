@@ -29,7 +29,7 @@ from gliderwatch.model import Assessment, Flag, Kind, Segment, Unusable
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, process
 from gliderwatch.score.graft import Graft, GraftKind, grafted, navigate, own_speeds
-from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 
 HOUR, DAY = 3600.0, 86400.0

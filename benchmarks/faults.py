@@ -14,7 +14,7 @@ from common import tree
 from storm import DECODE_SECONDS, Kind, Lane, SparedError, Storm
 
 from acceptance.chaos import flood
-from gliderwatch.store.damage import asides
+from gliderwatch.store.maintenance import asides
 
 _PAGE = 4096
 _DAY = 86400.0

@@ -22,17 +22,17 @@ from common import GLIDERWATCH, configure, cost, folder, machine, memory, tree
 from rich.console import Console
 from rich.table import Table
 
-from gliderwatch.ingest.decode import decode
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState
-from gliderwatch.run import intake
-from gliderwatch.run.speaking import NOBODY
-from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.service import transaction
+from gliderwatch.service.routing import NOBODY
+from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Fault, FaultKind, Scenario
+from gliderwatch.slocum.decode import decode
 from gliderwatch.store import codec
 from gliderwatch.store.segments import RECENT, SPARSE
-from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.store.state_file import File, Status, Store
 
 YEARS, YEAR = 5.0, 365.25 * 86400.0
 DEATH = 300.0
@@ -62,7 +62,7 @@ def pattern(where: Path) -> Pattern:
         segment = decode(path, [where / "cache"])
         file = File(str(path), 1, 1, Status.WAITING, "bruce", segment.id.name)
         params = GliderParams(speed_min=0.2, speed_max=0.4)
-        intake.take(store, file, segment, params, NOBODY, segment.last_t)
+        transaction.process_file(store, file, segment, params, NOBODY, segment.last_t)
     dive, expected = store.assessments("bruce")[-2], store.forecasts("bruce")[-1]
     incidents = store.incidents("bruce")
     store.close()

@@ -12,20 +12,19 @@ from pathlib import Path
 import numpy as np
 
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.estimation.causes import Cause
-from gliderwatch.estimation.observation import observe
-from gliderwatch.estimation.speed import SpeedParams, SpeedState, Verdict, step
-from gliderwatch.ingest import names
-from gliderwatch.ingest.decode import decode
+from gliderwatch.estimation.dive_measurement import observe
+from gliderwatch.estimation.modes import Cause
+from gliderwatch.estimation.verdict import SpeedParams, SpeedState, Verdict, step
 from gliderwatch.model import Current, Dive, Segment, readonly
 from gliderwatch.navigation.dives import Navigation, extend
-from gliderwatch.simulate.dockserver import write_mission
-from gliderwatch.simulate.faults import Fault, FaultKind
+from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.flight import Airframe
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.ocean import Constituent, Ellipse, Front, Sea
 from gliderwatch.simulate.onboard import Point
-from gliderwatch.simulate.scenario import DiveTruth, Scenario
+from gliderwatch.simulate.scenario import DiveTruth, Fault, FaultKind, Scenario
+from gliderwatch.slocum import folders
+from gliderwatch.slocum.decode import decode
 
 DAY, HOUR, MONTH = 86400.0, 3600.0, 30 * 86400.0
 USUAL = SpeedParams()
@@ -77,7 +76,7 @@ def read(folder: Path, cache: Path) -> list[Segment]:
     """The segments below a folder in the order of time, the fullest copy of each, of what can be read."""
     found: dict[str, Segment] = {}
     for path in sorted(folder.rglob("*")):
-        if path.is_file() and names.kind(path.name) is not None:
+        if path.is_file() and folders.kind(path.name) is not None:
             try:
                 segment = decode(path, [cache])
             except GliderwatchError:

@@ -10,7 +10,7 @@ import time
 
 from common import busy, configure, daemon, folder, machine, memory, tree, wait_taken
 
-from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
 

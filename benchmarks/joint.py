@@ -5,7 +5,7 @@ python benchmarks/joint.py calibrate [--gliders 8]
 
 Dives come from files: simulated gliders write Dinkum files, which are decoded and navigated like real ones.
 What is said of a dive is said with all that is known of it in the end. `calibrate` prints how often the
-test for a step speaks on healthy gliders: the table of `detection/sequential.py`.
+test for a step speaks on healthy gliders: the table of `estimation/step_test.py`.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ from flights import (
     various,
 )
 
-from gliderwatch.estimation.causes import Cause
-from gliderwatch.estimation.joint import JointParams
-from gliderwatch.estimation.speed import SpeedParams
+from gliderwatch.estimation.kalman import JointParams
+from gliderwatch.estimation.modes import Cause
+from gliderwatch.estimation.verdict import SpeedParams
 from gliderwatch.score.grid import cells, load_grid
-from gliderwatch.simulate.faults import FaultKind
+from gliderwatch.simulate.scenario import FaultKind
 
 
 def speed_row(name: str, flights: Sequence[Flown]) -> str:

@@ -16,7 +16,7 @@ from typing import Any
 from aiosmtpd.controller import Controller
 from common import configure, daemon, folder, machine, taken, wait_taken
 
-from gliderwatch.simulate.dockserver import arrivals, write_cache
+from gliderwatch.simulate.delivery import arrivals, write_cache
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
 

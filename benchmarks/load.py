@@ -27,10 +27,10 @@ from common import GLIDERWATCH, configure, daemon, folder, machine, memory, tree
 from rich.console import Console
 from rich.table import Table
 
-from gliderwatch.simulate.dockserver import arrivals, write_cache
+from gliderwatch.simulate.delivery import arrivals, write_cache
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
-from gliderwatch.store.sqlite import Store
+from gliderwatch.store.state_file import Store
 
 PORT = 18026
 MISSIONS = 4
@@ -43,7 +43,7 @@ LONGEST = 7200.0
 FLOOR = """
 import sys, time
 import dbdreader
-from gliderwatch.ingest.segment import SENSORS
+from gliderwatch.slocum.sensors import SENSORS
 paths = sys.stdin.read().split("\\n")
 dbdreader.DBD(paths[0], cacheDir=sys.argv[1])
 begun = time.time()

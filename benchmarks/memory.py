@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from common import configure, daemon, folder, machine, memory, taken, tree, wait_taken
 
-from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
 

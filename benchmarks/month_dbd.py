@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from common import cost, floor, folder, machine
 
+from gliderwatch.simulate.delivery import deliver
 from gliderwatch.simulate.dinkum import Sensor, SensorList, encode
-from gliderwatch.simulate.dockserver import deliver
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
 from gliderwatch.simulate.telemetry import SegmentData

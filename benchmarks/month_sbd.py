@@ -12,7 +12,7 @@ from pathlib import Path
 
 from common import cost, floor, folder, machine, one_core
 
-from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
 

@@ -19,7 +19,7 @@ from types import CodeType, FrameType
 from click.testing import CliRunner
 
 import gliderwatch
-from gliderwatch.cli import main
+from gliderwatch.cli.main import main
 
 ROOT = str(Path(gliderwatch.__file__).parent)
 BEGIN, OPENED = {"process_file", "take"}, {("message.py", "opened"), ("incident_text.py", "opened")}

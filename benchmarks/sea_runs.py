@@ -15,25 +15,23 @@ import msgspec
 
 import gliderwatch
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.ingest.decode import decode
 from gliderwatch.model import Alert, Kind, Segment
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, process
-from gliderwatch.run import intake
-from gliderwatch.run.speaking import NOBODY
-from gliderwatch.score.record import HEALTHY, DiveResult, NextResult
-from gliderwatch.score.surfacings import results as forecast_results
+from gliderwatch.score.accuracy import results as forecast_results
+from gliderwatch.score.measures import HEALTHY, DiveResult, NextResult
 from gliderwatch.score.work import dive_results
-from gliderwatch.simulate.delivery import FileForm, Names, arrivals
-from gliderwatch.simulate.dockserver import deliver, write_cache
-from gliderwatch.simulate.faults import SIZES, Fault, FaultKind
+from gliderwatch.service import transaction
+from gliderwatch.service.routing import NOBODY
+from gliderwatch.simulate.delivery import FileForm, Names, arrivals, deliver, write_cache
 from gliderwatch.simulate.glider import simulate
-from gliderwatch.simulate.scenario import DiveTruth, Scenario
+from gliderwatch.simulate.scenario import SIZES, DiveTruth, Fault, FaultKind, Scenario
 from gliderwatch.simulate.seas import sea_mission, with_fault
+from gliderwatch.slocum.decode import decode
 from gliderwatch.store.codec import decode as unpacked
 from gliderwatch.store.codec import encode as packed
 from gliderwatch.store.database import MEMORY
-from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.store.state_file import File, Status, Store
 
 DAY, HOUR = 86400.0, 3600.0
 ONSET, AFTER = 6.0, 15.5
@@ -199,14 +197,14 @@ def _fed(store: Store, flown: Flight, params: GliderParams) -> Iterator[tuple[fl
     """Each message with the time (s) at which it could be told, in order; silences come between files."""
     glider, clock = flown.segments[0].id.glider, flown.on_shore[0]
     for segment, at in zip(flown.segments, flown.on_shore, strict=True):
-        tick = intake.next_tick(store, glider, NOBODY, clock)
+        tick = transaction.next_tick(store, glider, NOBODY, clock)
         while tick is not None and clock < tick <= at:
-            for alert in intake.tick(store, glider, NOBODY, (), tick):
+            for alert in transaction.tick(store, glider, NOBODY, (), tick):
                 yield tick, alert
-            clock, tick = tick, intake.next_tick(store, glider, NOBODY, tick)
+            clock, tick = tick, transaction.next_tick(store, glider, NOBODY, tick)
         clock = at
         file = File(segment.id.name, 0, 0, Status.WAITING, glider, segment.id.name)
-        for alert in intake.take(store, file, segment, params, NOBODY, at).alerts:
+        for alert in transaction.process_file(store, file, segment, params, NOBODY, at).alerts:
             yield at, alert
 
 

@@ -27,7 +27,7 @@ from common import machine
 from sea_runs import AS_IT_IS, FAULTS, SETTLED, Job, Message, Result, as_json, run
 
 from gliderwatch.model import Kind
-from gliderwatch.score.record import HEALTHY, DiveResult
+from gliderwatch.score.measures import HEALTHY, DiveResult
 from gliderwatch.simulate.seas import SEAS
 
 MONTH, DAY, HOUR = 30 * 24.0, 86400.0, 3600.0

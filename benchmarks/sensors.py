@@ -26,7 +26,7 @@ from common import machine
 from flights import read
 
 from gliderwatch.model import Assessment, Kind, Segment
-from gliderwatch.navigation.quality import NOT_SURFACED
+from gliderwatch.navigation.dives import NOT_SURFACED
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, process
 from gliderwatch.score.graft import Graft, GraftKind, grafted, navigate, own_speeds

@@ -14,12 +14,11 @@ from tempfile import TemporaryDirectory
 from rich.console import Console
 from rich.table import Table
 
-from gliderwatch.simulate.delivery import FileForm, Names
-from gliderwatch.simulate.dockserver import play, steps, write_cache, write_full_rate
+from gliderwatch.simulate.delivery import FileForm, Names, play, steps, write_cache, write_full_rate
 from gliderwatch.simulate.glider import simulate
+from gliderwatch.simulate.job import write_truth
 from gliderwatch.simulate.scenario import Scenario
-from gliderwatch.simulate.scenarios import load, shipped
-from gliderwatch.simulate.truth import write_truth
+from gliderwatch.simulate.scenario_files import load_scenario, shipped
 
 DAYS = 30.0
 
@@ -46,7 +45,7 @@ def main() -> None:
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     table = Table("scenario", "files", "MB", "fly (s)", "write (s)", "total (s)")
     for name, path in shipped().items():
-        scenario = replace(load(path), days=DAYS)
+        scenario = replace(load_scenario(path), days=DAYS)
         cases = {name: (scenario, False)}
         if name == "calm":
             cases["calm, compressed"] = (scenario, True)

@@ -26,17 +26,16 @@ import numpy as np
 from common import machine
 from flights import read, various
 
-from gliderwatch.forecast.learning import ground, is_unseen
-from gliderwatch.forecast.surfacing import Surfacings
-from gliderwatch.model import Dive, Expected, Segment, Unusable
+from gliderwatch.forecast.surfacing import Surfacings, ground, is_unseen
+from gliderwatch.model import Dive, NextSurfacing, Segment, Unusable
 from gliderwatch.navigation.dives import Navigation, extend
-from gliderwatch.navigation.frame import to_plane
+from gliderwatch.navigation.geodesy import to_plane
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, process
-from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
-from gliderwatch.simulate.scenarios import find, load
+from gliderwatch.simulate.scenario_files import find, load_scenario
 
 PARAMS = GliderParams()
 SHOWN = ("calm", "tidal", "deep", "front")
@@ -48,7 +47,7 @@ class Forecast:
     surfacings, and the ``speed`` (m/s) estimated."""
 
     dive: Dive
-    expected: Expected
+    expected: NextSurfacing
     known: Surfacings
     speed: float
     at: float
@@ -132,7 +131,7 @@ def sail(scenario: Scenario) -> np.ndarray:
 def fleet(gliders: int) -> list[tuple[str, Scenario]]:
     """Gliders of 12 days in four seas, on short and long ways, with airframes of their own."""
     coastal = [(name.split(",")[0], scenario) for name, scenario in various(gliders)]
-    ocean = load(find("deep"))
+    ocean = load_scenario(find("deep"))
     deep = [
         ("deep", replace(ocean, seed=s.seed, days=12, place=s.place, waypoints=s.waypoints, pitch=s.pitch))
         for sea, s in coastal

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
-from gliderwatch.alerts.outbox import Delivery, OutboxRow
+from gliderwatch.delivery.dispatcher import Delivery, OutboxRow
 from gliderwatch.model import Alert, Assessment, Incident, Kind, Severity
 
 DIVE = 1667639520.0  # 2022-11-05 09:12 UTC

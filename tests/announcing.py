@@ -1,14 +1,14 @@
-"""A glider's dives by letters, and what is to be said of them: for tests of `rules.announce`."""
+"""A glider's dives by letters, and what is to be said of them: for tests of `incidents.notifications`."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 from alert_support import SLOW
-from gliderwatch.model import Alert, Assessment, Expected, Incident
+from gliderwatch.incidents.notifications import NotificationState, due_notifications
+from gliderwatch.incidents.state_machine import RuleStates, advance
+from gliderwatch.model import Alert, Assessment, Incident, NextSurfacing
 from gliderwatch.params import RuleParams
-from gliderwatch.rules.announce import Said, due
-from gliderwatch.rules.incident import Watches, judge
 
 HOUR = 3600.0
 STEP = 3 * HOUR
@@ -30,7 +30,7 @@ class World:
 
     dives: dict[float, Assessment]
     rules: RuleParams = RuleParams()
-    next: Expected | None = None
+    next: NextSurfacing | None = None
 
     @classmethod
     def of(cls, letters: str, rules: RuleParams | None = None) -> World:
@@ -40,9 +40,9 @@ class World:
 
     def incidents(self) -> tuple[Incident, ...]:
         """As the rules find them in all dives in order."""
-        state, found = Watches(), {}
+        state, found = RuleStates(), {}
         for t in sorted(self.dives):
-            state, told = judge(state, self.dives[t], self.rules)
+            state, told = advance(state, self.dives[t], self.rules)
             found |= {i.id: i for i in told}
         return tuple(sorted(found.values(), key=lambda i: (i.opened_at, i.id)))
 
@@ -50,7 +50,7 @@ class World:
         """The dive that began at a time."""
         return self.dives.get(t_dive)
 
-    def expected(self, until: float) -> Expected | None:
+    def expected(self, until: float) -> NextSurfacing | None:
         """The next surfacing, where the test gives one."""
         return self.next
 
@@ -64,12 +64,12 @@ class Talk:
     """All that is said while a world becomes known."""
 
     def __init__(self, reminder_hours: float | None = 24.0, notices: bool = False) -> None:
-        self.said, self.alerts = Said(), list[Alert]()
+        self.said, self.alerts = NotificationState(), list[Alert]()
         self.reminder_hours, self.notices = reminder_hours, notices
 
     def hear(self, world: World | str) -> list[str]:
         """The kinds of the messages that a world leads to now."""
         known = World.of(world) if isinstance(world, str) else world
-        self.said, new = due(self.said, known, self.reminder_hours, self.notices)
+        self.said, new = due_notifications(self.said, known, self.reminder_hours, self.notices)
         self.alerts += new
         return [str(a.kind) for a in new]

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gliderwatch.errors import Quarantine
-from gliderwatch.ingest.decode import decode
+from gliderwatch.slocum.decode import decode
 
 
 def misbehave(path: Path, cache_folders: Sequence[Path]) -> object:

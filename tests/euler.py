@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from gliderwatch.estimation.adaptive import AdaptiveParams, AdaptiveState
-from gliderwatch.estimation.basis import Basis, phi
 from gliderwatch.model import Array, readonly
+from gliderwatch.papers.basis import Basis, phi
+from gliderwatch.papers.learner import AdaptiveParams, AdaptiveState
 
 
 def euler_step(

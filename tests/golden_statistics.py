@@ -12,7 +12,7 @@ import numpy as np
 
 from gliderwatch.model import Assessment, Segment, Series, readonly
 from gliderwatch.navigation.dives import Navigation, extend
-from gliderwatch.navigation.frame import magnetic_to_true
+from gliderwatch.navigation.geodesy import magnetic_to_true
 from gliderwatch.navigation.track import closure
 from missions import feed, real
 

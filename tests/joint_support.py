@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gliderwatch.model import Current, Dive, DiveFeatures, Fix, Track, readonly
-from gliderwatch.navigation.frame import from_plane
+from gliderwatch.navigation.geodesy import from_plane
 
 START = 1_700_000_000.0
 HOUR, DAY = 3600.0, 86400.0

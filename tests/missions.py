@@ -10,14 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from gliderwatch.errors import Retry
-from gliderwatch.ingest import names
-from gliderwatch.ingest.decode import decode
 from gliderwatch.model import Assessment, Incident, Segment, SegmentId, Series, readonly
-from gliderwatch.navigation.frame import from_plane
+from gliderwatch.navigation.geodesy import from_plane
 from gliderwatch.params import GliderParams
-from gliderwatch.run.intake import Speaking, take
+from gliderwatch.service.routing import Routing
+from gliderwatch.service.transaction import process_file
+from gliderwatch.slocum import folders
+from gliderwatch.slocum.decode import decode
 from gliderwatch.store import codec
-from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.store.state_file import File, Status, Store
 
 START = 1_700_000_000.0
 LAT, LON = 36.0, -70.0
@@ -154,7 +155,7 @@ def real(data: Path, name: str) -> tuple[Segment, ...]:
     """The segments of a real mission in order of time; those without a cache file are left out."""
     out = []
     for path in sorted((data / name / "from-glider").iterdir()):
-        if names.kind(path.name) is not None:
+        if folders.kind(path.name) is not None:
             try:
                 out.append(decode(path, [data / name / "cache"]))
             except Retry:
@@ -168,14 +169,14 @@ def real(data: Path, name: str) -> tuple[Segment, ...]:
 def feed(
     segments: Sequence[Segment],
     params: GliderParams | None = None,
-    speaking: Speaking | None = None,
+    speaking: Routing | None = None,
     store: Store | None = None,
 ) -> Store:
     """The store after all `segments` were taken in, in the order given."""
     store = store if store is not None else Store.open(":memory:")
     for i, s in enumerate(segments):
         file = File(f"/{i}/{s.id.name}", 1, 1, Status.WAITING, s.id.glider, s.id.name)
-        take(store, file, s, params or GliderParams(), speaking, 0.0)
+        process_file(store, file, s, params or GliderParams(), speaking, 0.0)
     return store
 
 

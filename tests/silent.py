@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from alert_support import HEALTHY
-from gliderwatch.alerts.overdue import Fleet
-from gliderwatch.model import Alert, Assessment, Expected, Incident
-from gliderwatch.rules.overdue import Silence, next_tick, tick
-from gliderwatch.rules.silence import Sign
+from gliderwatch.incidents.overdue import Sign, Silence, next_tick, tick
+from gliderwatch.messages.overdue_text import Fleet
+from gliderwatch.model import Alert, Assessment, Incident, NextSurfacing
 
 HOUR = 3600.0
 DAY = 24 * HOUR
@@ -19,9 +18,9 @@ CALL = 900.0
 MARGIN = INTERVAL + 2400.0
 
 
-def expected(after: float = T0, **changes: object) -> Expected:
+def expected(after: float = T0, **changes: object) -> NextSurfacing:
     """The surfacing after one at `after`: 3 h later, 5 km to the east."""
-    made = Expected(after, after + INTERVAL, 600.0, 30.0, -80.0, 1e6, 0.0, 4e6, "as before")
+    made = NextSurfacing(after, after + INTERVAL, 600.0, 30.0, -80.0, 1e6, 0.0, 4e6, "as before")
     return replace(made, **changes)  # type: ignore[arg-type]
 
 
@@ -52,7 +51,7 @@ class Sea:
             None if t is None else replace(HEALTHY, t_surface=t, t_dive=t - 2.5 * HOUR, lat=30.0, lon=-80.05)
         )
 
-    def expected(self, until: float) -> Expected | None:
+    def expected(self, until: float) -> NextSurfacing | None:
         t = max((t for t in self.surfacings if t <= until), default=None)
         return None if t is None else expected(t)
 

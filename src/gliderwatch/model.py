@@ -4,7 +4,7 @@ Units are SI, times are seconds since 1970-01-01T00:00:00Z, latitudes and longit
 north and east, angles radians. Velocities are (east, north) relative to true north. The one
 exception is `Segment`, whose headings and currents are as the glider reports them, relative to
 magnetic north, with the declination beside them: a segment may not hold the position that the
-declination depends on, so that `navigation.frame` rotates them once it is known.
+declination depends on, so that `navigation.geodesy` rotates them once it is known.
 """
 
 from __future__ import annotations
@@ -257,7 +257,7 @@ class Assessment:
 
 
 @dataclass(frozen=True, slots=True)
-class Expected:
+class NextSurfacing:
     """The next surfacing, as it is expected after the last one.
 
     ``after`` the last surfacing and ``t`` the next (s), with its standard error ``t_sigma`` (s); ``lat`` and

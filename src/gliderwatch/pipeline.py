@@ -12,17 +12,23 @@ from functools import cache
 
 import msgspec
 
-from gliderwatch.currents.field import Field
+from gliderwatch.estimation.dive_measurement import are_apart
 from gliderwatch.estimation.glider import Estimate, step
-from gliderwatch.estimation.observation import are_apart
-from gliderwatch.forecast.learning import ground
 from gliderwatch.forecast.outlook import look_ahead
-from gliderwatch.forecast.surfacing import Surfacings, expect, learn
-from gliderwatch.forecast.waypoints import Heard, bound_for, heard
-from gliderwatch.model import Assessment, Dive, Expected, Incident, Segment
+from gliderwatch.forecast.surfacing import (
+    Surfacings,
+    WaypointLog,
+    active_waypoint,
+    expect,
+    ground,
+    learn,
+    read_waypoints,
+)
+from gliderwatch.incidents.state_machine import RuleStates, advance, end_all
+from gliderwatch.model import Assessment, Dive, Incident, NextSurfacing, Segment
 from gliderwatch.navigation.dives import Navigation, extend
 from gliderwatch.params import GliderParams
-from gliderwatch.rules.incident import Watches, ended, judge
+from gliderwatch.sea.ocean_field import Field
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,9 +37,9 @@ class Memory:
     where and when it comes up next (None: cannot be said yet)."""
 
     estimate: Estimate = Estimate()
-    watches: Watches = Watches()
+    watches: RuleStates = RuleStates()
     surfacings: Surfacings = Surfacings()
-    expected: Expected | None = None
+    expected: NextSurfacing | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +57,7 @@ class GliderState:
     assessment: Assessment | None = None
     told: tuple[Incident, ...] = ()
     memory: Memory = Memory()
-    waypoints: Heard = ()
+    waypoints: WaypointLog = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +72,7 @@ class Outcome:
     since: float
     assessments: tuple[Assessment, ...]
     incidents: tuple[Incident, ...]
-    expected: Expected | None
+    expected: NextSurfacing | None
 
 
 @cache
@@ -87,7 +93,7 @@ def process(
     settled, last, assessment, memory = state.settled, state.last, state.assessment, state.memory
     assessments = {assessment.t_dive: assessment} if assessment is not None else {}
     incidents = {i.id: i for i in settled.watches.open()}
-    waypoints = heard(state.waypoints, segment)
+    waypoints = read_waypoints(state.waypoints, segment)
     changed = {i.id: i for i in state.told}
     for dive in dives:
         if dive.end is None:  # not surfaced yet: worth telling, not worth learning from
@@ -97,7 +103,7 @@ def process(
             incidents |= changed
             settled = memory
         last = dive
-        waypoint = bound_for(waypoints, dive.end.t)
+        waypoint = active_waypoint(waypoints, dive.end.t)
         memory, assessment, told = _after(settled, dive, waypoint, params, key, ocean)
         changed = {i.id: i for i in told}
         assessments[dive.t_dive] = assessment
@@ -124,10 +130,10 @@ def _after(
     last = before.surfacings.fix
     if last is not None and dive.start is not None and are_apart(last, dive.start):
         # another deployment: what was open on the last one is over
-        over, before = ended(before.watches, dive.t_dive), Memory()
+        over, before = end_all(before.watches, dive.t_dive), Memory()
     frozen = bool(before.watches.open())
     estimate, assessment = step(before.estimate, dive, params, key, frozen, ocean)
-    watches, told = judge(before.watches, assessment, params.rules)
+    watches, told = advance(before.watches, assessment, params.rules)
     surfacings = learn(before.surfacings, dive, waypoint, before.expected)
     outlook = look_ahead(estimate, ground(dive))
     expected = None if outlook is None else expect(surfacings, *outlook, params.surfacing_hours)

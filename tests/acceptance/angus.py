@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from acceptance.support import Site, healthy, until
-from gliderwatch.simulate.dockserver import Arrival, FileForm, Names, arrivals
-from gliderwatch.store.sqlite import Status
+from gliderwatch.simulate.delivery import Arrival, FileForm, Names, arrivals
+from gliderwatch.store.state_file import Status
 
 MISSION = healthy(1.0)
 FILES = list(arrivals(MISSION))

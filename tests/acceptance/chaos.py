@@ -26,12 +26,12 @@ from acceptance.support import (
     results,
     until,
 )
-from gliderwatch.alerts.mail import message_id
+from gliderwatch.delivery.mail import message_id
 from gliderwatch.errors import StateError
-from gliderwatch.simulate.dockserver import FileForm, Names, arrivals
+from gliderwatch.simulate.delivery import FileForm, Names, arrivals
 from gliderwatch.simulate.scenario import Mission
-from gliderwatch.store.damage import damage
-from gliderwatch.store.sqlite import Status, Store
+from gliderwatch.store.maintenance import damage
+from gliderwatch.store.state_file import Status, Store
 
 SENDER = "gliderwatch@dockserver.local"
 HOOK = Path(__file__).with_name("hook")

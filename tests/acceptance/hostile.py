@@ -11,15 +11,15 @@ from pathlib import Path
 import lz4.block
 
 import bad_decode
-from gliderwatch.ingest.decode import decode
+from gliderwatch.slocum.decode import decode
 
 _PROGRAM = """
 import functools, sys
 sys.path[:0] = {folders!r}
 from acceptance.hostile import misbehave
-from gliderwatch.run import parts
+from gliderwatch.service import parts
 parts.Decoder = functools.partial(parts.Decoder, decode=misbehave, timeout={timeout})
-from gliderwatch.cli import main
+from gliderwatch.cli.main import main
 if __name__ == "__main__":
     main()
 """

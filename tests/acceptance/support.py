@@ -24,10 +24,10 @@ from typing import Any
 from aiosmtpd.controller import Controller
 
 from gliderwatch.model import Assessment, Incident
-from gliderwatch.simulate.dockserver import deliver, write_cache
+from gliderwatch.simulate.delivery import deliver, write_cache
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Fault, FaultKind, Mission, Scenario
-from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.store.state_file import File, Status, Store
 
 GLIDERWATCH = Path(sys.executable).with_name("gliderwatch")
 PATIENCE = 60.0

@@ -12,8 +12,8 @@ from acceptance.angus import FILES, MISSION, put, taken
 from acceptance.support import Daemon, Site, command, until
 from acceptance.test_replay import counts
 from gliderwatch.model import SegmentId
-from gliderwatch.simulate.dockserver import FileForm, arrivals
-from gliderwatch.store.sqlite import Status, Store
+from gliderwatch.simulate.delivery import FileForm, arrivals
+from gliderwatch.store.state_file import Status, Store
 from integration.test_science import NAME, NO_DEPTH, OTHER, SCIENCE, flight, science
 
 WHOLE = list(arrivals(MISSION, FileForm(factored=False)))

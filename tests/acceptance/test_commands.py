@@ -20,7 +20,7 @@ from acceptance.support import (
     mail_server,
     until,
 )
-from gliderwatch.simulate.dockserver import arrivals
+from gliderwatch.simulate.delivery import arrivals
 
 
 @pytest.fixture

@@ -26,9 +26,9 @@ from acceptance.support import (
     results,
     until,
 )
-from gliderwatch.simulate.dockserver import arrivals
+from gliderwatch.simulate.delivery import arrivals
 from gliderwatch.simulate.scenario import Mission
-from gliderwatch.store.sqlite import Status
+from gliderwatch.store.state_file import Status
 
 # --------------------------------------------------------------------------- signals
 

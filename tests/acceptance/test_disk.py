@@ -24,9 +24,9 @@ from acceptance.support import (
     results,
     until,
 )
-from gliderwatch.run.life import silence
-from gliderwatch.run.trouble import PAUSE
-from gliderwatch.store.sqlite import Store
+from gliderwatch.service.liveness import seconds_silent
+from gliderwatch.service.state_outage import PAUSE
+from gliderwatch.store.state_file import Store
 
 EARLY, LATE = FILES[:3], FILES[3:]
 
@@ -96,7 +96,7 @@ def test_a_state_that_becomes_read_only_is_said_and_no_sign_of_life_given(site: 
             until(lambda: told(daemon), "it says so")
             since = time.monotonic()
             until(lambda: time.monotonic() - since > 3.0, "longer than a beat")
-            still = silence(site.state)
+            still = seconds_silent(site.state)
             assert still is not None and still > 2.9
             assert site.statuses(*(f.name for f in LATE)) == [None] * len(LATE)
             switch.write_text("", encoding="utf-8")

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from acceptance.support import TRACEBACK, Daemon, Site, command, mail_server, remora, until
-from gliderwatch.simulate.dockserver import arrivals
+from gliderwatch.simulate.delivery import arrivals
 
 GLIDERS = ("bruce", "lena")
 

@@ -18,8 +18,8 @@ from acceptance.support import (
     results,
     until,
 )
-from gliderwatch.simulate.dockserver import arrivals
-from gliderwatch.store.sqlite import Status
+from gliderwatch.simulate.delivery import arrivals
+from gliderwatch.store.state_file import Status
 
 TAKEN, WAITING, DUPLICATE = Status.TAKEN, Status.WAITING, Status.DUPLICATE
 
@@ -263,14 +263,14 @@ def test_damaged_files_never_end_it(site: Site, daemon: Daemon) -> None:
 
 
 POISON = """
-from gliderwatch.run import intake
+from gliderwatch.service import intake
 good = intake.process
 def process(state, segment, *rest):
     if segment.id.name.endswith("-3"):
         raise ZeroDivisionError("unforeseen")
     return good(state, segment, *rest)
 intake.process = process
-from gliderwatch.cli import main
+from gliderwatch.cli.main import main
 main()
 """
 

@@ -16,8 +16,8 @@ import pytest
 from acceptance.angus import FILES, put, taken
 from acceptance.hostile import fill, peak, program, shown, workers
 from acceptance.support import TRACEBACK, Daemon, Site, command, remora, results, until
-from gliderwatch.simulate.dockserver import arrivals
-from gliderwatch.store.sqlite import Status
+from gliderwatch.simulate.delivery import arrivals
+from gliderwatch.store.state_file import Status
 
 N = 200
 DAEMON_MB, WORKERS_MB = 400.0, 2500.0

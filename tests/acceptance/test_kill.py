@@ -24,9 +24,9 @@ from acceptance.support import (
     results,
     until,
 )
-from gliderwatch.ingest.header import read_header
-from gliderwatch.simulate.dockserver import FileForm, Names, arrivals
-from gliderwatch.store.sqlite import Status
+from gliderwatch.simulate.delivery import FileForm, Names, arrivals
+from gliderwatch.slocum.header import read_header
+from gliderwatch.store.state_file import Status
 
 KILLS = 5
 

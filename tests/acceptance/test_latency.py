@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from acceptance.support import Daemon, Site, healthy, mail_server, until
-from gliderwatch.simulate.dockserver import arrivals
+from gliderwatch.simulate.delivery import arrivals
 
 WARM, MEASURED = 4, 50
 LIMIT = 1.0

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from acceptance.support import TRACEBACK, Daemon, Mailbox, Site, command, mail_server, remora, results, until
-from gliderwatch.simulate.dockserver import Arrival, arrivals
+from gliderwatch.simulate.delivery import Arrival, arrivals
 from gliderwatch.simulate.scenario import Mission
-from gliderwatch.store.sqlite import Status, Store
+from gliderwatch.store.state_file import Status, Store
 
 
 @cache

@@ -16,12 +16,12 @@ import click
 import pytest
 
 from acceptance.support import GLIDERWATCH, PATIENCE, TRACEBACK, Site, command, mail_server, remora, until
-from gliderwatch.alerts.samples import SAMPLES
-from gliderwatch.alerts.words import map_link
-from gliderwatch.cli import main
-from gliderwatch.command_look import SAMPLES as OFFERED
+from gliderwatch.cli.look import SAMPLES as OFFERED
+from gliderwatch.cli.main import main
+from gliderwatch.messages.formatting import map_link
+from gliderwatch.messages.samples import SAMPLES
 from gliderwatch.model import Kind
-from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.simulate.delivery import write_mission
 
 ROOT = Path(__file__).resolve().parents[2]
 USUAL = "/etc/gliderwatch/gliderwatch.yml"

@@ -17,16 +17,16 @@ import pytest
 
 from acceptance.angus import FILES, put, taken
 from acceptance.support import TRACEBACK, Daemon, Site, command, mail_server, notify_socket, until
-from gliderwatch.store.sqlite import Status
+from gliderwatch.store.state_file import Status
 
 TESTS = Path(__file__).resolve().parents[1]
 NOWHERE = "/nonexistent"
 """A PATH without timedatectl: what this machine says of its clock is no part of the test."""
 QUICK = """\
 import functools, sys
-from gliderwatch.run import daemon, heartbeat, parts
+from gliderwatch.service import daemon, heartbeat, parts
 from bad_decode import misbehave
-from gliderwatch.cli import main
+from gliderwatch.cli.main import main
 daemon.BEAT, heartbeat.DECODING = 0.2, 1.0
 parts.Decoder = functools.partial(parts.Decoder, decode=misbehave)
 sys.argv[0] = "gliderwatch"

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from acceptance.support import Daemon, Mailbox, Site, command, mail_server, until
-from gliderwatch.ingest.decode import decode
-from gliderwatch.run.replay import Request, replay
-from gliderwatch.simulate.dockserver import Arrival, arrivals, write_mission
+from gliderwatch.service.replay import Request, replay
+from gliderwatch.simulate.delivery import Arrival, arrivals, write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Mission, Scenario
+from gliderwatch.slocum.decode import decode
 
 HOUR, DAY = 3600.0, 86400.0
 GLIDER = "cora"

@@ -23,9 +23,9 @@ from acceptance.support import (
     results,
     until,
 )
-from gliderwatch.simulate.dockserver import arrivals
-from gliderwatch.store.damage import asides
-from gliderwatch.store.sqlite import Store
+from gliderwatch.simulate.delivery import arrivals
+from gliderwatch.store.maintenance import asides
+from gliderwatch.store.state_file import Store
 
 PAGE = 4096
 

@@ -17,8 +17,8 @@ import pytest
 
 from acceptance.support import TRACEBACK, Daemon, Site, command, until
 from gliderwatch.config import load
-from gliderwatch.run import preconditions
-from gliderwatch.store.sqlite import Store
+from gliderwatch.service import preconditions
+from gliderwatch.store.state_file import Store
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "schema-1.sqlite.gz"
 Break = Callable[[Site, dict[str, Any]], None]

@@ -24,8 +24,8 @@ from acceptance.support import (
     remora,
     until,
 )
+from gliderwatch.simulate.delivery import FileForm, Names, write_mission
 from gliderwatch.simulate.dinkum import Generation
-from gliderwatch.simulate.dockserver import FileForm, Names, write_mission
 
 FLIGHT = {".sbd", ".scd", ".mbd", ".mcd", ".dbd", ".dcd"}
 NUMBERS = ("lat", "lon", "speed", "flow_u", "flow_v", "reference_u", "reference_v", "p_e", "clle_max")

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from acceptance.support import GLIDERWATCH, TRACEBACK, Site, command, healthy, lines
-from gliderwatch.run.replay import WRITTEN
-from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.service.replay import WRITTEN
+from gliderwatch.simulate.delivery import write_mission
 
 README = Path(__file__).resolve().parents[2] / "README.md"
 

@@ -12,11 +12,11 @@ import pytest
 from acceptance.angus import FILES, put, taken
 from acceptance.chaos import hooked
 from acceptance.support import TRACEBACK, Daemon, Mailbox, Site, command, lines, mail_server, results, until
-from gliderwatch.alerts.outbox import HEARTBEAT
-from gliderwatch.simulate.dockserver import arrivals
+from gliderwatch.delivery.dispatcher import HEARTBEAT
+from gliderwatch.simulate.delivery import arrivals
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Fault, FaultKind, Mission, Rates, Scenario
-from gliderwatch.store.sqlite import Status, Store
+from gliderwatch.store.state_file import Status, Store
 
 DAY = 86400.0
 LEAP = 1709121600.0 + 43200.0  # 2024-02-28T12:00Z

@@ -6,11 +6,11 @@ import time
 from pathlib import Path
 
 from acceptance.support import TRACEBACK, Daemon, Site, command, lines, mail_server, until
-from gliderwatch.ingest.header import parse_header
-from gliderwatch.simulate.dockserver import arrivals, cache, write_cache
+from gliderwatch.simulate.delivery import arrivals, cache, write_cache
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Mission, Scenario
-from gliderwatch.store.sqlite import Status
+from gliderwatch.slocum.header import parse_header
+from gliderwatch.store.state_file import Status
 
 DAY = 86400.0
 GLIDER = "cora"

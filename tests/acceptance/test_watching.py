@@ -13,18 +13,18 @@ import pytest
 from acceptance.angus import FILES, SHORT, put, taken
 from acceptance.chaos import flood, hooked
 from acceptance.support import Daemon, Site, until
-from gliderwatch.store.sqlite import Status
+from gliderwatch.store.state_file import Status
 
 BROKEN = """
 import errno
 from pathlib import Path
 from watchdog.observers import inotify_c
-from gliderwatch.run import daemon
-from gliderwatch.ingest import header
+from gliderwatch.service import daemon
+from gliderwatch.slocum import header
 daemon.BEAT = 0.5
 MARK = Path({mark!r})
 {how}
-from gliderwatch.cli import main
+from gliderwatch.cli.main import main
 if __name__ == "__main__":
     main()
 """

@@ -17,18 +17,18 @@ from tempfile import TemporaryDirectory
 
 sys.path[:0] = [str(Path(__file__).parents[1])]
 
-from gliderwatch.ingest.decode import decode  # noqa: E402
 from gliderwatch.model import Segment  # noqa: E402
-from gliderwatch.run.intake import Speaking  # noqa: E402
+from gliderwatch.service.routing import Routing  # noqa: E402
 from gliderwatch.simulate import job  # noqa: E402
+from gliderwatch.slocum.decode import decode  # noqa: E402
 from gliderwatch.store import codec  # noqa: E402
 from gliderwatch.store.database import SCHEMA  # noqa: E402
-from gliderwatch.store.sqlite import Store  # noqa: E402
+from gliderwatch.store.state_file import Store  # noqa: E402
 from missions import feed  # noqa: E402
 
 NEXT, KEPT = 3, 5
 """Segments that come after the state file was kept, and dives that the cut leaves in it."""
-SPEAKING = Speaking(channels=lambda alert: ["mail"], notices=lambda glider: False)
+SPEAKING = Routing(channels=lambda alert: ["mail"], notices=lambda glider: False)
 
 
 def simulated(folder: Path) -> list[Segment]:

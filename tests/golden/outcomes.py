@@ -39,20 +39,16 @@ from ruamel.yaml import YAML
 
 from gliderwatch.config import Config, load
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.ingest.decode import decode
-from gliderwatch.run.intake import take
-from gliderwatch.run.replay import Request, replay
-from gliderwatch.run.speaking import speaking
-from gliderwatch.score.estimators import ALGORITHMS, configuration
-from gliderwatch.score.grid import Cell, cells, load_grid
-from gliderwatch.simulate.delivery import FileForm, Names, arrivals
-from gliderwatch.simulate.dockserver import deliver, from_glider, write_cache
-from gliderwatch.simulate.faults import SIZES, Fault, FaultKind
+from gliderwatch.score.grid import ALGORITHMS, Cell, cells, configuration, load_grid
+from gliderwatch.service.replay import Request, replay
+from gliderwatch.service.routing import routing_of
+from gliderwatch.service.transaction import process_file
+from gliderwatch.simulate.delivery import FileForm, Names, arrivals, deliver, from_glider, write_cache
 from gliderwatch.simulate.glider import simulate
-from gliderwatch.simulate.scenario import Mission, Rates, Scenario
-from gliderwatch.simulate.scenarios import find
-from gliderwatch.simulate.scenarios import load as load_scenario
-from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.simulate.scenario import SIZES, Fault, FaultKind, Mission, Rates, Scenario
+from gliderwatch.simulate.scenario_files import find, load_scenario
+from gliderwatch.slocum.decode import decode
+from gliderwatch.store.state_file import File, Status, Store
 
 SHARED_DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 REAL = ("electa-2022", "usf-sam-2019", "george-2024", "osu-2025", "maria-2022")
@@ -180,7 +176,7 @@ def _replayed(mission: Mission, config: Config) -> Store:
 
 def _arriving(mission: Mission, config: Config) -> Store:
     """The files of a mission one by one as they come: late, cut and whole again, newest first."""
-    store, said = Store.open(":memory:"), speaking(config)
+    store, said = Store.open(":memory:"), routing_of(config)
     with TemporaryDirectory(prefix="gliderwatch-gate-") as name:
         folder = Path(name)
         write_cache(folder / "cache", mission)
@@ -192,7 +188,7 @@ def _arriving(mission: Mission, config: Config) -> Store:
             except GliderwatchError:
                 continue  # cut before anything that can be read
             file = File(f"/{i}/{path.name}", 1, 1, Status.WAITING, segment.id.glider, segment.id.name)
-            take(store, file, segment, config.glider(segment.id.glider), said, arrival.time)
+            process_file(store, file, segment, config.glider(segment.id.glider), said, arrival.time)
     return store
 
 

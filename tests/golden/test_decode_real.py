@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from gliderwatch.errors import MissingCache, Quarantine
-from gliderwatch.ingest import names
-from gliderwatch.ingest.decode import Decoder, decode
-from gliderwatch.ingest.header import read_header
-from gliderwatch.ingest.segment import QUANTITIES, model_declination
 from gliderwatch.model import Segment
+from gliderwatch.slocum import folders
+from gliderwatch.slocum.decode import Decoder, decode
+from gliderwatch.slocum.header import read_header
+from gliderwatch.slocum.sensors import QUANTITIES, model_declination
 
 pytestmark = pytest.mark.real
 
@@ -27,7 +27,7 @@ MISSIONS = {
 
 
 def flight_files(folder: Path) -> list[Path]:
-    return sorted(path for path in folder.glob("from-glider/*") if names.kind(path.name))
+    return sorted(path for path in folder.glob("from-glider/*") if folders.kind(path.name))
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gliderwatch.estimation.causes import Cause
-from gliderwatch.estimation.observation import observe
-from gliderwatch.estimation.reckoned import vertical
-from gliderwatch.estimation.speed import SpeedParams, SpeedState, step
+from gliderwatch.estimation.dive_measurement import observe
+from gliderwatch.estimation.kinematic_speed import vertical
+from gliderwatch.estimation.modes import Cause
+from gliderwatch.estimation.verdict import SpeedParams, SpeedState, step
 from gliderwatch.model import Current, Flag, readonly
 from gliderwatch.navigation.dives import Navigation, extend
 from missions import REAL, real

@@ -9,7 +9,7 @@ from statistics import median
 import pytest
 from ruamel.yaml import YAML
 
-from gliderwatch.run.intake import Speaking
+from gliderwatch.service.routing import Routing
 from golden_statistics import golden_file, median_misfit, statistics
 from missions import REAL, feed, real
 
@@ -71,7 +71,7 @@ def test_without_a_variation_in_the_files_the_model_closes_it(shared_data):
 def test_a_month_of_files_is_taken_in_within_two_seconds(shared_data):
     """Seconds of one core for 300 decoded files, from segment to state file, in memory; median of 3."""
     missions = [real(shared_data, name) for name in REAL]
-    speaking = Speaking(channels=lambda alert: ["mail"], notices=lambda glider: True)
+    speaking = Routing(channels=lambda alert: ["mail"], notices=lambda glider: True)
     spent = []
     for _ in range(3):
         start = time.process_time()

@@ -5,9 +5,9 @@ import pytest
 from gliderwatch.errors import Quarantine
 from gliderwatch.model import SegmentId
 from gliderwatch.params import GliderParams
-from gliderwatch.run import intake
+from gliderwatch.service import transaction
 from gliderwatch.store.segments import RECENT, Segments
-from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.store.state_file import File, Status, Store
 from missions import Leg, ending, feed, mission
 
 LEGS = [Leg(heading=0.4 * k) for k in range(24)]
@@ -61,7 +61,7 @@ def test_what_was_taken_back_is_not_gone_on_from(path, monkeypatch):
         patch.setattr(Segments, "thin", lambda *_: (_ for _ in ()).throw(Quarantine("broken")))
         with pytest.raises(Quarantine), store.followed_by(RECENT):
             file = File("/x", 1, 1, Status.WAITING, "unit", made[10].id.name)
-            intake.take(store, file, made[10], GliderParams(), None, 0.0)
+            transaction.process_file(store, file, made[10], GliderParams(), None, 0.0)
     feed(made[11:], store=store)
     assert ending(store, "unit") == ending(feed([*made[:10], *made[11:]]), "unit")
 

@@ -6,11 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gliderwatch.ingest.decode import decode
-from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.onboard import Point, displacement, nmea
 from gliderwatch.simulate.scenario import Scenario
+from gliderwatch.slocum.decode import decode
 from missions import feed
 from simulated import degrees, samples
 

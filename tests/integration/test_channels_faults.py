@@ -16,13 +16,13 @@ import pytest
 from aiosmtpd.controller import Controller
 
 from alert_support import alert, until
-from gliderwatch.alerts.channels import Channel, DeliveryError
-from gliderwatch.alerts.outbox import Dispatcher, retry_delay
+from gliderwatch.cli.status import overview
 from gliderwatch.config import load
-from gliderwatch.run import operator
-from gliderwatch.run.status import overview
+from gliderwatch.delivery.channels import Channel, DeliveryError
+from gliderwatch.delivery.dispatcher import Dispatcher, retry_delay
+from gliderwatch.service import operator_alerts
 from gliderwatch.store.outbox import Outbox
-from gliderwatch.store.sqlite import Store
+from gliderwatch.store.state_file import Store
 
 HOUR = 3600.0
 
@@ -280,8 +280,8 @@ def test_a_channel_that_is_dead_for_an_hour_is_reported_over_the_others(state: P
     with closing(Store.open(state)) as store, closing(Outbox(state)) as outbox:
         store.post(alert("a"), ["mail"], now)
         outbox.failed(outbox.due(now)[0].id, "connection refused", now + 5.0)
-        watch = operator.Operator(store, state, config, now, 0.0)
-        limits = operator.Settings(silent_hours=None, free_mb=None)
+        watch = operator_alerts.Operator(store, state, config, now, 0.0)
+        limits = operator_alerts.Settings(silent_hours=None, free_mb=None)
         assert watch.look(config, limits, now + 0.9 * HOUR, 0.0) == ()
         (report,) = watch.look(config, limits, now + 1.1 * HOUR, 0.0)
         assert "channel mail has not delivered" in report.title and "connection refused" in report.body

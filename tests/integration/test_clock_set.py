@@ -8,17 +8,17 @@ from itertools import pairwise
 import pytest
 
 from clocks import WEEKS, shifted, with_clock_set
+from gliderwatch.incidents import overdue
 from gliderwatch.model import Kind, SegmentId
-from gliderwatch.rules import overdue, silence
-from gliderwatch.run import intake
-from gliderwatch.run.intake import Speaking
+from gliderwatch.service import transaction
+from gliderwatch.service.routing import Routing
 from gliderwatch.store import codec, database
-from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.store.state_file import File, Status, Store
 from missions import START, Leg, ending, feed, mission
 
 HOUR, DAY = 3600.0, 86400.0
 LEGS = [Leg(hours=3.0, heading=1.0 + 0.02 * (k % 3)) for k in range(24)]
-ALL = Speaking(channels=lambda alert: ["mail"], notices=lambda glider: False)
+ALL = Routing(channels=lambda alert: ["mail"], notices=lambda glider: False)
 
 
 def live(segments, delays=None, store=None, start=0):
@@ -26,9 +26,9 @@ def live(segments, delays=None, store=None, start=0):
     store, alerts = store or Store.open(":memory:"), []
     for i, (s, came) in enumerate(zip(segments, delays, strict=True), start):
         file = File(f"/{i}/{s.id.name}", 1, 1, Status.WAITING, s.id.glider, s.id.name)
-        params, now = intake.GliderParams(), came
-        alerts += intake.tick(store, "unit", ALL, [], now)
-        alerts += intake.take(store, file, s, params, ALL, now).alerts
+        params, now = transaction.GliderParams(), came
+        alerts += transaction.tick(store, "unit", ALL, [], now)
+        alerts += transaction.process_file(store, file, s, params, ALL, now).alerts
     return store, alerts
 
 
@@ -59,7 +59,7 @@ class TestSetBack:
     def test_it_is_not_overdue_while_it_calls(self, step):
         store, alerts = live(with_clock_set(MISSION, 15, step), CAME)
         assert not [a for a in alerts if a.kind == Kind.OVERDUE]
-        at = intake.next_tick(store, "unit", ALL, CAME[-1])
+        at = transaction.next_tick(store, "unit", ALL, CAME[-1])
         assert at is not None and at > CAME[-1] + 3 * HOUR
 
 
@@ -117,12 +117,12 @@ class TestNotKnownByHowMuch:
         assert not [a for a in alerts if a.kind == Kind.OVERDUE]
         signs = store.known("unit").signs(0.0)
         expected = store.known("unit").expected(LOST_CAME[-1])
-        assert silence.awaited(expected, signs, LOST_CAME[-1], None).heard == LOST_CAME[-1]
+        assert overdue.expected_call(expected, signs, LOST_CAME[-1], None).heard == LOST_CAME[-1]
 
     def test_a_glider_that_was_overdue_has_called(self):
         store, _ = live(MISSION[:14], CAME[:14])
         late = CAME[13] + 2 * DAY
-        (alert,) = intake.tick(store, "unit", ALL, [], late)
+        (alert,) = transaction.tick(store, "unit", ALL, [], late)
         assert alert.kind == Kind.OVERDUE
         _, alerts = live([FALLEN[15]], [late + HOUR], store, 50)
         assert Kind.ALL_CLEAR in {a.kind for a in alerts}
@@ -145,7 +145,7 @@ def test_a_restart_with_a_wrong_clock_is_told_and_the_glider_has_called():
     assert told.title == "GLIDERWATCH: files of unit are dated 7173 days before they came"
     assert "kept apart" in told.body and "unit-2004-100-0" in told.body
     assert not any(a.flag for a in store.assessments("unit"))
-    assert intake.next_tick(store, "unit", ALL, CAME[-1]) > CAME[-1] + 3 * HOUR
+    assert transaction.next_tick(store, "unit", ALL, CAME[-1]) > CAME[-1] + 3 * HOUR
 
 
 def test_a_file_that_is_sent_again_days_later_is_not_told():
@@ -159,7 +159,7 @@ def test_an_archive_read_at_the_first_start_is_no_glider_at_sea():
     old = [shifted(s, -400 * DAY) for s in MISSION]
     store, alerts = live(old, [START + 1.0 * i for i in range(len(old))])
     assert not alerts
-    assert not silence.is_at_sea(store.known("unit").signs(0.0), 3 * HOUR, START + 100.0)
+    assert not overdue.is_at_sea(store.known("unit").signs(0.0), 3 * HOUR, START + 100.0)
     assert overdue.next_tick((), store.known("unit"), None, START + 100.0) is None
 
 

@@ -14,8 +14,8 @@ import pytest
 import dinkum
 from bad_decode import misbehave
 from gliderwatch.errors import MissingCache, Quarantine, Retry
-from gliderwatch.ingest.decode import Decoder, decode
 from gliderwatch.model import Segment
+from gliderwatch.slocum.decode import Decoder, decode
 
 CRC = "0abc12ef"
 
@@ -324,7 +324,7 @@ def test_nothing_is_written_beside_the_data_nor_into_the_cache_folder(station, t
 def test_home_and_locale_are_left_alone(station, tmp_path):
     script = (
         "import locale, os, sys; from pathlib import Path\n"
-        "from gliderwatch.ingest.decode import decode\n"
+        "from gliderwatch.slocum.decode import decode\n"
         "locale.setlocale(locale.LC_ALL, 'C')\n"
         "decode(Path(sys.argv[1]), [Path(sys.argv[2])])\n"
         "assert 'dbdreader' in sys.modules\n"
@@ -434,7 +434,7 @@ def test_workers_end_with_a_daemon_that_is_killed(tmp_path):
     script = (
         "import sys, time; from pathlib import Path\n"
         "from bad_decode import misbehave\n"
-        "from gliderwatch.ingest.decode import Decoder\n"
+        "from gliderwatch.slocum.decode import Decoder\n"
         "if __name__ == '__main__':\n"
         "    decoder = Decoder([], decode=misbehave, timeout=1)\n"
         "    print(decoder.submit(Path('pid.sbd')).exception(20), flush=True)\n"

@@ -12,8 +12,7 @@ import lz4.block
 import numpy as np
 import pytest
 
-from gliderwatch.simulate.dinkum import Generation, Header, Sensor, SensorList, encode
-from gliderwatch.simulate.dockserver import (
+from gliderwatch.simulate.delivery import (
     FileForm,
     Names,
     arrivals,
@@ -24,11 +23,11 @@ from gliderwatch.simulate.dockserver import (
     write_full_rate,
     write_mission,
 )
+from gliderwatch.simulate.dinkum import Generation, Header, Sensor, SensorList, encode
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import FixIn, Mission, Rates, Scenario
-from gliderwatch.simulate.scenarios import find, load
-from gliderwatch.simulate.sensors import SCIENCE_CADENCE
-from gliderwatch.simulate.telemetry import CADENCE, SegmentData
+from gliderwatch.simulate.scenario_files import find, load_scenario
+from gliderwatch.simulate.telemetry import CADENCE, SCIENCE_CADENCE, SegmentData
 
 FORMS = [
     FileForm(names, compressed, factored, generation)
@@ -168,7 +167,7 @@ def test_arrivals_come_in_order_after_the_segment_is_closed(mission: Mission) ->
 
 @pytest.mark.timing
 def test_a_month_is_made_quickly_and_the_same_to_the_byte() -> None:
-    scenario = replace(load(find("tidal")), days=30.0)
+    scenario = replace(load_scenario(find("tidal")), days=30.0)
     began = time.process_time()
     files = list(arrivals(simulate(scenario)))
     assert time.process_time() - began < 10

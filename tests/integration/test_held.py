@@ -10,15 +10,15 @@ from pathlib import Path
 import pytest
 
 from alert_support import alert
-from gliderwatch.alerts.outbox import Delivery
+from gliderwatch.delivery.dispatcher import Delivery
+from gliderwatch.incidents.send_schedule import QuietHours, Wait
 from gliderwatch.model import Alert, Severity
-from gliderwatch.rules.waiting import QuietHours, Wait
-from gliderwatch.run import metrics
-from gliderwatch.run.operator import HOUR
-from gliderwatch.run.posting import post_alert
-from gliderwatch.store import damage, outbox
+from gliderwatch.service import metrics
+from gliderwatch.service.operator_alerts import HOUR
+from gliderwatch.service.routing import post_alert
+from gliderwatch.store import maintenance, outbox
 from gliderwatch.store.outbox import Outbox
-from gliderwatch.store.sqlite import Store
+from gliderwatch.store.state_file import Store
 from gliderwatch.store.watch_health import Failing, failing
 
 NOW = 1_700_000_000.0  # 22:13 UTC
@@ -203,8 +203,8 @@ class TestLookedAt:
     def test_it_is_saved_from_a_damaged_file(self, store: Store, path: Path) -> None:
         post(store, alert("a"), CHIEF)
         store.close()
-        aside = damage.set_aside(path, 0.0)
-        damage.restore(path, aside, lambda n: alert("damaged", time=NOW), ["mail"])
+        aside = maintenance.set_aside(path, 0.0)
+        maintenance.restore(path, aside, lambda n: alert("damaged", time=NOW), ["mail"])
         with closing(Store.open(path)) as new:
             assert [(u.alert, u.held_until) for u in new.undelivered()] == [
                 ("a", NOW + HALF),
@@ -218,8 +218,8 @@ class TestLookedAt:
             "ALTER TABLE outbox DROP COLUMN delivery;"
         )
         store.close()
-        aside = damage.set_aside(path, 0.0)
-        damage.restore(path, aside, lambda n: alert("damaged", time=NOW), ["mail"])
+        aside = maintenance.set_aside(path, 0.0)
+        maintenance.restore(path, aside, lambda n: alert("damaged", time=NOW), ["mail"])
         with closing(Store.open(path)) as new:
             assert [u.alert for u in new.undelivered()] == ["a", "damaged"]
 

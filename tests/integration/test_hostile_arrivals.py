@@ -13,16 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.ingest.decode import decode
 from gliderwatch.model import Assessment, Incident
 from gliderwatch.params import GliderParams
-from gliderwatch.run import arrivals, intake
-from gliderwatch.run.backlog import Job
-from gliderwatch.simulate.dockserver import arrivals as sent
-from gliderwatch.simulate.dockserver import write_cache
+from gliderwatch.service import transaction, triage
+from gliderwatch.service.triage import Job
+from gliderwatch.simulate.delivery import arrivals as sent
+from gliderwatch.simulate.delivery import write_cache
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Fault, FaultKind, Scenario
-from gliderwatch.store.sqlite import Store
+from gliderwatch.slocum.decode import decode
+from gliderwatch.store.state_file import Store
 
 REMORA = Fault(FaultKind.REMORA, Scenario().start + 0.7 * 86400, 8.0)
 MISSION = simulate(Scenario(seed=4, glider="bruce", days=1.3, faults=(REMORA,)))
@@ -44,15 +44,15 @@ class Shore:
         """One file is there, or has changed."""
         path = self.inbox / name
         path.write_bytes(data)
-        job = arrivals.judge(path, self.store, [self.caches], lambda _: True)
+        job = triage.triage(path, self.store, [self.caches], lambda _: True)
         now = float(next(self._clock))
         if isinstance(job, Job):
             try:
                 segment = decode(path, [self.caches])
             except GliderwatchError as error:
-                self.store.note(arrivals.failed(job.file, error), now)
+                self.store.note(triage.failed(job.file, error), now)
             else:
-                intake.take(self.store, job.file, segment, GliderParams(), None, now)
+                transaction.process_file(self.store, job.file, segment, GliderParams(), None, now)
         elif job is not None:
             self.store.note(job, now)
 

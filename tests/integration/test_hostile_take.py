@@ -12,11 +12,11 @@ import pytest
 
 import dinkum
 from gliderwatch.config import load
-from gliderwatch.ingest.decode import decode
-from gliderwatch.ingest.watch import FileChanged
 from gliderwatch.model import Segment
-from gliderwatch.run.daemon import Daemon
-from gliderwatch.store.sqlite import File, Status
+from gliderwatch.service.daemon import Daemon
+from gliderwatch.slocum.decode import decode
+from gliderwatch.slocum.watch import FileChanged
+from gliderwatch.store.state_file import File, Status
 
 NAME = "unit_7-2024-250-1-3.sbd"
 WHOLE = dinkum.header() + dinkum.cycles(dinkum.rows(60))

@@ -19,19 +19,19 @@ import structlog
 from rich.console import Console
 
 import dinkum
-from gliderwatch import tables
-from gliderwatch.alerts import console as frames
-from gliderwatch.alerts import message
-from gliderwatch.alerts.channels import Channel
-from gliderwatch.alerts.mail import Envelope, compose
+from gliderwatch.cli import tables
+from gliderwatch.cli import tables as frames
+from gliderwatch.cli.status import Overview, as_json
 from gliderwatch.config import Problem
+from gliderwatch.delivery.channels import Channel
+from gliderwatch.delivery.mail import Envelope, compose
 from gliderwatch.errors import Quarantine
-from gliderwatch.ingest.header import parse_header
+from gliderwatch.messages import incident_text
 from gliderwatch.model import Alert, Severity
-from gliderwatch.run import logs
-from gliderwatch.run.intake import Taken
-from gliderwatch.run.status import Overview, as_json
-from gliderwatch.store.sqlite import File, Status
+from gliderwatch.service import logs
+from gliderwatch.service.transaction import FileOutcome
+from gliderwatch.slocum.header import parse_header
+from gliderwatch.store.state_file import File, Status
 
 NASTY = (
     "\x1b[2J\x1b]0;owned\x07\x9b31m\r\nBcc: thief@x.org\r\n\r\n<script>alert(1)</script><img src=x onerror=a>"
@@ -48,7 +48,7 @@ UNKNOWN = File(PATH, 1, 2, Status.UNKNOWN, NASTY, NASTY, NASTY)
 
 def operator(text: str) -> Alert:
     """A message of which every part comes from outside."""
-    return message.operator(
+    return incident_text.operator(
         text,
         f"first\n{text}",
         1.7e9,
@@ -97,7 +97,7 @@ def heard(monkeypatch: pytest.MonkeyPatch, tty: bool) -> Iterator[io.StringIO]:
 
 def say() -> None:
     """One line each of the log that tells of a file, of a message, of an error, and of a library."""
-    logs.taken(Taken(BAD))
+    logs.taken(FileOutcome(BAD))
     logs.alerts([operator(NASTY)])
     logs.log.warning("folder left out", reason=f"{PATH} cannot be read", paths=[PATH])
     logs.log.info("seen", path=BARE)
@@ -191,7 +191,7 @@ def test_what_check_found_is_harmless() -> None:
 
 def test_an_alert_on_a_terminal_is_harmless() -> None:
     console, stream = shown()
-    frames.show(operator(NASTY), console)
+    frames.show_alert(operator(NASTY), console)
     assert is_harmless(stream.getvalue())
     assert "[bold]x[/]" in " ".join(stream.getvalue().split())
 

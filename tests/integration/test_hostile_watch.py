@@ -21,9 +21,9 @@ from watchdog.observers.polling import PollingObserverVFS
 
 import dinkum
 from gliderwatch.errors import Quarantine, Retry
-from gliderwatch.ingest import watch
-from gliderwatch.ingest.header import read_header, read_regular
-from gliderwatch.ingest.watch import Change, EventsLost, FileChanged, Watcher
+from gliderwatch.slocum import watch
+from gliderwatch.slocum.header import read_header, read_regular
+from gliderwatch.slocum.watch import Change, EventsLost, FileChanged, Watcher
 
 NAME = "electa-2022-308-3-2.sbd"
 QUEUE = Path("/proc/sys/fs/inotify/max_queued_events")
@@ -146,7 +146,7 @@ def test_the_limits_of_the_kernel_itself(tmp_path: Path, limit: str | None, poll
     for number in range(10):
         (tmp_path / f"g{number}" / "from-glider").mkdir(parents=True)
     script = (
-        "import sys; from queue import Queue; from gliderwatch.ingest.watch import Watcher\n"
+        "import sys; from queue import Queue; from gliderwatch.slocum.watch import Watcher\n"
         "watcher = Watcher([sys.argv[1]], {}, [], Queue()); watcher.start()\n"
         "print(watcher.alive(), *watcher.problems); watcher.stop()\n"
     )

@@ -7,10 +7,10 @@ import pytest
 import xarray as xr
 
 from gliderwatch.config import load
-from gliderwatch.currents.field import Field
 from gliderwatch.errors import GliderwatchError, Quarantine, Retry
-from gliderwatch.ingest.ocean import Area, read_field
-from gliderwatch.run.ocean import Ocean
+from gliderwatch.sea.ocean_field import Field
+from gliderwatch.sea.ocean_files import Box, read_field
+from gliderwatch.service.ocean_cache import OceanCache
 
 HOUR = 3600.0
 T0 = 1_714_521_600.0  # 2024-05-01
@@ -96,14 +96,14 @@ def test_a_globe_is_closed(tmp_path):
 
 def test_an_area_cuts_what_is_read_and_leaves_a_margin(tmp_path):
     path = written(tmp_path, dataset(lon=LON + 360))
-    field = read_field([path], Area(27.1, 27.4, -84.3, -84.1))
+    field = read_field([path], Box(27.1, 27.4, -84.3, -84.1))
     assert field.u.shape[2:] == (2, 2)
     is_right(field)
     globe = written(tmp_path, dataset(lon=np.arange(-180.0, 180.0, 10.0)), "globe.nc")
-    across = read_field([globe], Area(26.5, 28.0, 172.0, -172.0))
+    across = read_field([globe], Box(26.5, 28.0, 172.0, -172.0))
     assert len(across.lon) == 3 and not isinstance(across.at(T0, 27.0, 179.0, 0.0), str)
     with pytest.raises(Quarantine, match=r"model\.nc covers 26 to 29 degrees only, the area is 40 to 41"):
-        read_field([path], Area(40.0, 41.0, -84.3, -84.1))
+        read_field([path], Box(40.0, 41.0, -84.3, -84.1))
 
 
 def test_a_grid_over_the_date_line(tmp_path):
@@ -298,7 +298,7 @@ def test_a_broken_file_is_a_word_and_not_a_crash(tmp_path, keep):
 
 
 def test_too_much_is_refused_before_it_is_read(tmp_path, monkeypatch):
-    monkeypatch.setattr("gliderwatch.ingest.ocean.MOST", 100)
+    monkeypatch.setattr("gliderwatch.sea.ocean_files.MOST", 100)
     with pytest.raises(Quarantine, match="too large to be held in memory: set an area"):
         read_field([written(tmp_path, dataset())])
 
@@ -316,7 +316,7 @@ def test_the_daemon_reads_the_files_again_when_they_change(tmp_path: Path) -> No
         "gliders: {with: {reference: model}, without: }\n",
         encoding="utf-8",
     )
-    ocean = Ocean(load(config))
+    ocean = OceanCache(load(config))
     assert ocean.field("with") is None  # no file yet: the dive goes without, and a warning says so
     (tmp_path / "model").mkdir()
     written(tmp_path / "model", dataset(), "a.nc")

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from alert_support import MemoryStore, alert, until
-from gliderwatch.alerts.channels import DeliveryError
-from gliderwatch.alerts.outbox import Dispatcher, OutboxRow, retry_delay
+from gliderwatch.delivery.channels import DeliveryError
+from gliderwatch.delivery.dispatcher import Dispatcher, OutboxRow, retry_delay
 from gliderwatch.model import Alert, Severity
 
 

@@ -8,19 +8,19 @@ from pathlib import Path
 
 import pytest
 
-from gliderwatch.ingest.decode import decode
-from gliderwatch.ingest.header import read_header
+from gliderwatch.incidents.send_schedule import Wait
 from gliderwatch.model import Alert, Segment, SegmentId, Severity
 from gliderwatch.params import Attention, GliderParams
-from gliderwatch.rules.waiting import Wait
-from gliderwatch.run import intake
-from gliderwatch.run.intake import Speaking
-from gliderwatch.run.replay import Request, replay
-from gliderwatch.run.ticking import HOLD, TICK, Ticking
-from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.service import transaction
+from gliderwatch.service.daemon import HOLD, TICK, OverdueTimer
+from gliderwatch.service.replay import Request, replay
+from gliderwatch.service.routing import Routing
+from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
-from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.slocum.decode import decode
+from gliderwatch.slocum.header import read_header
+from gliderwatch.store.state_file import File, Status, Store
 from missions import segment as made
 
 HOUR, DAY = 3600.0, 86400.0
@@ -34,12 +34,12 @@ class Live:
         self.path, self.now, self.monotonic = path, 0.0, 0.0
         self.alerts: list[Alert] = []
         self.gliders: list[str] = []
-        self.speaking = Speaking(lambda a: ["mail"], lambda g: False, lambda g: attention)
+        self.speaking = Routing(lambda a: ["mail"], lambda g: False, lambda g: attention)
         self.start()
 
     def start(self) -> None:
         self.store = Store.open(self.path)
-        self.ticking = Ticking(self.store)
+        self.ticking = OverdueTimer(self.store)
 
     def kill(self) -> None:
         self.store.close()
@@ -50,7 +50,7 @@ class Live:
         self.gliders = sorted({*self.gliders, segment.id.glider})
         self.now = segment.last_t if now is None else now
         file = File(f"/{segment.id.name}", 1, 1, Status.WAITING, segment.id.glider, segment.id.name)
-        taken = intake.take(self.store, file, segment, GliderParams(), self.speaking, self.now)
+        taken = transaction.process_file(self.store, file, segment, GliderParams(), self.speaking, self.now)
         return self._told(taken.alerts)
 
     def tick(self, now: float, is_busy: Callable[[str], bool] = lambda glider: False) -> list[str]:
@@ -165,7 +165,7 @@ def silent(fleet, path: Path | str = ":memory:", **attention) -> tuple[Live, lis
     for segment in segments[:n]:
         live.take(segment)
     live.tick(live.now + 60.0)
-    due = intake.next_tick(live.store, "angus", live.speaking, live.now)
+    due = transaction.next_tick(live.store, "angus", live.speaking, live.now)
     return live, segments[n:], due if due is not None else float("inf")
 
 
@@ -231,7 +231,7 @@ class TestSignsOfLife:
         file = File(
             "/x", 1, 1, Status.WAITING, "angus", header.name, "cache is missing", "ab", header.opened_at
         )
-        taken = intake.note(live.store, file, GliderParams(), live.speaking, after[0].last_t)
+        taken = transaction.record_file(live.store, file, GliderParams(), live.speaking, after[0].last_t)
         assert [str(a.kind) for a in taken.alerts] == ["all_clear"]
 
     def test_a_file_of_a_glider_that_is_not_configured_is_none(self, fleet) -> None:
@@ -239,15 +239,17 @@ class TestSignsOfLife:
         live.tick(due)
         header = after[0].id
         file = File("/x", 1, 1, Status.UNKNOWN, "angus", header.name, "not configured", "", header.opened_at)
-        assert intake.note(live.store, file, GliderParams(), live.speaking, due + HOUR).alerts == ()
+        assert (
+            transaction.record_file(live.store, file, GliderParams(), live.speaking, due + HOUR).alerts == ()
+        )
 
     def test_the_header_of_a_file_that_cannot_be_read(self, fleet) -> None:
         """What `arrivals.judge` makes of a file tells when it was opened."""
-        from gliderwatch.run.arrivals import judge
+        from gliderwatch.service.triage import triage
 
         path, segment = fleet[1][0]
         assert read_header(path).id == segment.id
-        found = judge(path, Store.open(":memory:"), [], lambda glider: True)
+        found = triage(path, Store.open(":memory:"), [], lambda glider: True)
         assert isinstance(found, File) and found.opened_at == segment.id.opened_at
 
     def test_history_is_none(self, fleet) -> None:
@@ -303,7 +305,7 @@ class TestEscalation:
     def test_it_is_withdrawn_where_the_configuration_mutes_the_glider(self, overdue, attention) -> None:
         live, _, due = overdue
         live.speaking = replace(live.speaking, attention=lambda glider: attention)
-        intake.speak(live.store, "angus", GliderParams(), live.speaking, due + HOUR / 4)
+        transaction.notify_pilots(live.store, "angus", GliderParams(), live.speaking, due + HOUR / 4)
         assert self.waiting(live) == {}
 
 

@@ -11,24 +11,23 @@ import pytest
 from acceptance.angus import FILES, angus, put, taken
 from acceptance.support import Daemon, until
 from alert_support import alert
+from gliderwatch.incidents.notifications import NotificationState
 from gliderwatch.model import SegmentId
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState
-from gliderwatch.rules.announce import Said
-from gliderwatch.run import intake
-from gliderwatch.run.intake import Speaking
-from gliderwatch.run.posting import post_alerts
-from gliderwatch.run.retention import DAY, HOUR, Retention
+from gliderwatch.service import transaction
+from gliderwatch.service.daemon import DAY, HOUR, Retention
+from gliderwatch.service.routing import Routing, post_alerts
 from gliderwatch.store import conversion, retention
 from gliderwatch.store.conversion import moved
-from gliderwatch.store.damage import damage
+from gliderwatch.store.maintenance import damage
 from gliderwatch.store.outbox import Outbox
 from gliderwatch.store.segments import RECENT
-from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.store.state_file import File, Status, Store
 from missions import Leg, ending, feed, mission, opened
 
 PARAMS = GliderParams(speed_min=0.2, speed_max=0.4, speed_learnt=False)
-ALL = Speaking(channels=lambda alert: ["mail"], notices=lambda glider: False)
+ALL = Routing(channels=lambda alert: ["mail"], notices=lambda glider: False)
 HEALTHY, SICK = Leg(speed=0.3), Leg(speed=0.08)
 LEGS = [SICK if 4 <= k < 8 else replace(HEALTHY, heading=0.3 * k) for k in range(RECENT + 26)]
 CUT = opened(LEGS, 70)
@@ -155,7 +154,7 @@ def test_an_incident_that_is_over_goes_with_what_was_said_of_it(store):
     assert told == 2  # the alarm and the all-clear
     clear(store)
     assert store.incidents("unit") == [] and store.said("unit").threads == () and store.alerts() == []
-    assert intake.speak(store, "unit", PARAMS, ALL, 0.0) == ()
+    assert transaction.notify_pilots(store, "unit", PARAMS, ALL, 0.0) == ()
     assert store._db.execute("SELECT count(*) FROM outbox").fetchone()[0] == 0
 
 
@@ -172,7 +171,7 @@ def test_an_open_incident_keeps_all_that_is_since():
     assert tail(store, incident.since) == [a for a in store.assessments("unit") if a.t_dive >= incident.since]
     assert len(tail(store, incident.since)) >= len(legs) - 21
     assert min(row[1] for row in after["segments"]) < incident.since
-    assert intake.speak(store, "unit", PARAMS, ALL, 0.0) == ()
+    assert transaction.notify_pilots(store, "unit", PARAMS, ALL, 0.0) == ()
 
 
 def test_an_end_that_was_not_told_keeps_its_incident(store):
@@ -183,7 +182,7 @@ def test_an_end_that_was_not_told_keeps_its_incident(store):
         post_alerts(store, "unit", replace(said, threads=(open_,)), (), lambda alert: (), 0.0)
     clear(store)
     assert len(store.incidents("unit")) == 1
-    assert [a.kind for a in intake.speak(store, "unit", PARAMS, ALL, 0.0)] == ["all_clear"]
+    assert [a.kind for a in transaction.notify_pilots(store, "unit", PARAMS, ALL, 0.0)] == ["all_clear"]
 
 
 def test_what_came_lately_is_kept_whatever_its_clock_says(store):
@@ -367,7 +366,7 @@ class TestDaily:
 
 
 def test_said_of_a_glider_without_incidents_is_left_alone(store):
-    said = Said(surfaced=5.0)
+    said = NotificationState(surfaced=5.0)
     with store.transaction():
         post_alerts(store, "unit", replace(store.said("unit"), surfaced=5.0), (), lambda alert: (), 0.0)
     clear(store)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import dinkum
-from gliderwatch.ingest.decode import decode
-from gliderwatch.ingest.segment import depth_of
+from gliderwatch.slocum.decode import decode
+from gliderwatch.slocum.sensors import depth_of
 
 NO_DEPTH = tuple(sensor for sensor in dinkum.SENSORS if sensor[0] != "m_depth")
 SCIENCE = (("sci_m_present_time", 8, "timestamp"), ("sci_water_pressure", 4, "bar"))

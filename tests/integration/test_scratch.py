@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from gliderwatch.ingest.scratch import Scratch
+from gliderwatch.slocum.caches import Scratch
 
-HOLD = "from gliderwatch.ingest.scratch import Scratch; print(Scratch().name, flush=True); input()"
+HOLD = "from gliderwatch.slocum.caches import Scratch; print(Scratch().name, flush=True); input()"
 KILLED = """
 import multiprocessing, os, signal, sys
-from gliderwatch.ingest.decode import _prepare
+from gliderwatch.slocum.decode import _prepare
 multiprocessing.get_context("spawn").Process(target=_prepare, args=(sys.argv[1], 1 << 40)).start()
 os.kill(os.getpid(), signal.SIGKILL)
 """

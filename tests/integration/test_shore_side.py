@@ -8,17 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from gliderwatch.ingest.decode import decode
 from gliderwatch.model import Alert, Segment
 from gliderwatch.params import GliderParams
-from gliderwatch.run import intake
-from gliderwatch.run.intake import Speaking
-from gliderwatch.run.replay import Request, replay
-from gliderwatch.run.ticking import Ticking
-from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.service import transaction
+from gliderwatch.service.daemon import OverdueTimer
+from gliderwatch.service.replay import Request, replay
+from gliderwatch.service.routing import Routing
+from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
-from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.slocum.decode import decode
+from gliderwatch.store.state_file import File, Status, Store
 
 HOUR, DAY = 3600.0, 86400.0
 START = Scenario().start
@@ -50,8 +50,8 @@ class Shore:
 
     def __init__(self, channels: Callable[[Alert], list[str]] = lambda a: ["mail"]) -> None:
         self.store = Store.open(":memory:")
-        self.speaking = Speaking(channels, lambda g: False)
-        self.ticking = Ticking(self.store)
+        self.speaking = Routing(channels, lambda g: False)
+        self.ticking = OverdueTimer(self.store)
         self.alerts: list[Alert] = []
         self.now = 0.0
 
@@ -68,7 +68,9 @@ class Shore:
             if segment is not None:
                 name = segment.id.name
                 file = File(f"/{name}", 1, 1, Status.WAITING, segment.id.glider, name)
-                taken = intake.take(self.store, file, segment, GliderParams(), self.speaking, end)
+                taken = transaction.process_file(
+                    self.store, file, segment, GliderParams(), self.speaking, end
+                )
                 self.alerts += taken.alerts
         return self.alerts[before:]
 

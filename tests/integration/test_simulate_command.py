@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from gliderwatch.cli import main
+from gliderwatch.cli.main import main
+from gliderwatch.simulate.job import write_truth
 from gliderwatch.simulate.scenario import Mission
-from gliderwatch.simulate.truth import write_truth
 
 REMORA = ("--fault", "remora:2@0.5")
 

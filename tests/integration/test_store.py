@@ -15,19 +15,18 @@ import pytest
 
 from alert_support import SLOW, alert, incident
 from gliderwatch.errors import GliderwatchError, StateError
-from gliderwatch.model import Alert, Expected, Segment, SegmentId, Series, Unusable, readonly
+from gliderwatch.incidents.notifications import NotificationState
+from gliderwatch.incidents.overdue import Sign
+from gliderwatch.model import Alert, NextSurfacing, Segment, SegmentId, Series, Unusable, readonly
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Memory, Outcome
-from gliderwatch.rules.announce import Said
-from gliderwatch.rules.silence import Sign
-from gliderwatch.run import intake
-from gliderwatch.run.intake import Speaking
-from gliderwatch.run.posting import post_alerts
-from gliderwatch.store import codec, damage, database
+from gliderwatch.service import routing, transaction
+from gliderwatch.service.routing import Routing, post_alerts
+from gliderwatch.store import codec, database, maintenance
 from gliderwatch.store.database import SCHEMA
 from gliderwatch.store.outbox import Outbox
 from gliderwatch.store.segments import Segments
-from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.store.state_file import File, Status, Store
 from missions import Leg, cut, ending, feed, mission
 
 GOLDEN = Path(__file__).parents[1] / "golden"
@@ -158,7 +157,7 @@ class TestOpening:
         then = json.loads(gzip.decompress(GOES_ON.read_bytes()))
         come = [codec.decode(base64.b64decode(record), Segment) for record in then.pop("segments")]
         with closing(Store.open(path)) as store:
-            speaking = Speaking(channels=lambda alert: ["mail"], notices=lambda glider: False)
+            speaking = Routing(channels=lambda alert: ["mail"], notices=lambda glider: False)
             feed(come, speaking=speaking, store=store)
             found = {
                 "assessments": store.assessments("sim"),
@@ -260,7 +259,7 @@ class TestDamage:
     def test_a_whole_file_and_no_file_are_not_damaged(self, store, path):
         with store.transaction():
             store.note(file("a"), 0.0)
-        assert damage.damage(path) is None and damage.damage(path.with_name("none")) is None
+        assert maintenance.damage(path) is None and maintenance.damage(path.with_name("none")) is None
 
     def test_another_kind_of_file_an_empty_one_and_bad_pages(self, store, path):
         for n in range(500):
@@ -269,47 +268,47 @@ class TestDamage:
         whole = path.read_bytes()
         for bad in (b"", b"x" * 5000, whole[:5000], whole[:8192] + b"\xa5" * 8192 + whole[16384:]):
             path.write_bytes(bad)
-            assert damage.damage(path)
+            assert maintenance.damage(path)
 
     def test_a_check_that_is_cut_short_calls_nothing_damaged(self, store, path):
         with store.transaction():
             for n in range(20_000):
                 store.note(file(f"file {n}"), 0.0)
         store.close()
-        assert [damage.damage(path, seconds) for seconds in np.linspace(0.0, 0.01, 10)] == [None] * 10
+        assert [maintenance.damage(path, seconds) for seconds in np.linspace(0.0, 0.01, 10)] == [None] * 10
 
     def test_all_of_it_is_renamed_and_a_second_time_does_not_hide_the_first(self, store, path):
         store.note(file("a"), 0.0)  # is in the log still
-        first = damage.set_aside(path, 0.0)
+        first = maintenance.set_aside(path, 0.0)
         assert first.name == path.name + ".damaged-19700101T000000Z"
         assert not list(path.parent.glob(path.name + "-*"))
         path.write_bytes(b"")
-        second = damage.set_aside(path, 0.0)
-        assert damage.asides(path) == [first, second]
+        second = maintenance.set_aside(path, 0.0)
+        assert maintenance.asides(path) == [first, second]
         with closing(Store.reading(first)) as old:
             assert old.counts() == {Status.TAKEN: 1}
 
     def test_what_was_told_is_saved_once(self, store, path):
         store.post(alert("a"), ["mail"], 1.0)
         store.post(alert("b"), ["mail", "slack"], 1.0)
-        post_alerts(store, "electa", Said(surfaced=5.0), [], lambda a: [], 1.0)
+        post_alerts(store, "electa", NotificationState(surfaced=5.0), [], lambda a: [], 1.0)
         store._db.execute("UPDATE outbox SET delivered_at = 2 WHERE alert = 'a'")
         store._db.execute("UPDATE alerts SET data = '{' WHERE id = 'b'")
         store.post(alert("c"), ["mail"], 1.0)
         store.close()
-        aside = damage.set_aside(path, 0.0)
+        aside = maintenance.set_aside(path, 0.0)
         saved = []
 
         def report(n: int) -> Alert:
             saved.append(n)
             return alert("damaged", body=f"{n} saved")
 
-        assert damage.restore(path, aside, report, ["mail"]) is not None
-        assert damage.restore(path, aside, report, ["mail"]) is None
+        assert maintenance.restore(path, aside, report, ["mail"]) is not None
+        assert maintenance.restore(path, aside, report, ["mail"]) is None
         with closing(Store.open(path)) as new:
             assert [a.id for a in new.alerts()] == ["a", "c", "damaged"] and saved[1] == 2
             assert [u.alert for u in new.undelivered()] == ["c", "damaged"]
-            assert new.said("electa") == Said(surfaced=5.0)
+            assert new.said("electa") == NotificationState(surfaced=5.0)
 
 
 class TestReading:
@@ -348,7 +347,7 @@ class TestTransaction:
         ],
     )
     def test_whatever_fails_on_the_way_leaves_nothing(self, store, monkeypatch, part, step):
-        speaking = intake.Speaking(channels=lambda a: ["mail"], notices=lambda g: True)
+        speaking = routing.Routing(channels=lambda a: ["mail"], notices=lambda g: True)
         feed(mission(LEGS)[:3], speaking=speaking, store=store)
         before = tables(store)
         whole = getattr(part, step)
@@ -370,7 +369,7 @@ class TestTransaction:
         code = (
             "import os, sys\n"
             "from pathlib import Path\n"
-            "from gliderwatch.store.sqlite import File, Status, Store\n"
+            "from gliderwatch.store.state_file import File, Status, Store\n"
             "store = Store.open(Path(sys.argv[1]))\n"
             "with store.transaction():\n"
             "    store.note(File('/x', 1, 1, Status.TAKEN), 0.0)\n"
@@ -503,8 +502,8 @@ class TestResults:
 
 
 class TestSurfacings:
-    def expect(self, store: Store, after: float, opened_at: float) -> Expected:
-        made = Expected(after, after + 100.0, opened_at, 30.0, -80.0, 1.0, 0.0, 1.0, "as before")
+    def expect(self, store: Store, after: float, opened_at: float) -> NextSurfacing:
+        made = NextSurfacing(after, after + 100.0, opened_at, 30.0, -80.0, 1.0, 0.0, 1.0, "as before")
         state = GliderState(memory=Memory(expected=made))
         store.segments.checkpoint(SegmentId(opened_at, "electa", f"electa-{opened_at:g}"), state)
         return made
@@ -542,8 +541,8 @@ class TestSurfacings:
 
 class TestMessages:
     def test_what_was_said_comes_back(self, store):
-        assert store.said("unit") == Said()
-        speaking = intake.Speaking(channels=lambda a: ["mail"], notices=lambda g: True)
+        assert store.said("unit") == NotificationState()
+        speaking = routing.Routing(channels=lambda a: ["mail"], notices=lambda g: True)
         feed(mission(LEGS), speaking=speaking, store=store)
         assert store.said("unit").surfaced is not None
         assert [a.kind for a in store.alerts()] == ["surfacing"] * 6
@@ -621,7 +620,7 @@ def test_a_duplicate_is_noted_and_changes_nothing(store):
     feed(made, store=store)
     before = ending(store, "unit")
     again = File("/again", 1, 1, Status.WAITING)
-    taken = intake.take(store, again, made[2], GliderParams(), None, 0.0)
+    taken = transaction.process_file(store, again, made[2], GliderParams(), None, 0.0)
     assert taken.file.status == Status.DUPLICATE and "fuller copy" in taken.file.reason
     assert ending(store, "unit") == before and store.counts()[Status.DUPLICATE] == 1
 

@@ -10,18 +10,18 @@ from pathlib import Path
 import pytest
 
 from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine
-from gliderwatch.ingest.decode import decode
-from gliderwatch.ingest.header import read_header
 from gliderwatch.model import Alert, Kind, Segment, Severity
 from gliderwatch.params import Attention, GliderParams
-from gliderwatch.run import arrivals, intake
-from gliderwatch.run.backlog import Job
-from gliderwatch.run.intake import Speaking
-from gliderwatch.run.replay import Request, replay
-from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.service import transaction, triage
+from gliderwatch.service.replay import Request, replay
+from gliderwatch.service.routing import Routing
+from gliderwatch.service.triage import Job
+from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
-from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.slocum.decode import decode
+from gliderwatch.slocum.header import read_header
+from gliderwatch.store.state_file import File, Status, Store
 
 HOUR, DAY = 3600.0, 86400.0
 HEALTHY = 40
@@ -33,11 +33,11 @@ class Live:
 
     def __init__(self, caches: Sequence[Path], attention: Attention = Attention()) -> None:  # noqa: B008
         self.store, self.caches = Store.open(":memory:"), caches
-        self.speaking = Speaking(lambda a: ["mail"], lambda g: False, lambda g: attention)
+        self.speaking = Routing(lambda a: ["mail"], lambda g: False, lambda g: attention)
         self.alerts: list[Alert] = []
 
     def come(self, path: Path, now: float) -> None:
-        found = arrivals.judge(path, self.store, self.caches, lambda glider: True)
+        found = triage.triage(path, self.store, self.caches, lambda glider: True)
         if isinstance(found, File):
             self._note(found, now)
         elif isinstance(found, Job):
@@ -46,14 +46,14 @@ class Live:
     def _take(self, file: File, path: Path, now: float) -> None:
         try:
             segment = decode(path, self.caches)
-            taken = intake.take(self.store, file, segment, GliderParams(), self.speaking, now)
+            taken = transaction.process_file(self.store, file, segment, GliderParams(), self.speaking, now)
         except GliderwatchError as error:
-            self._note(arrivals.failed(file, error), now)
+            self._note(triage.failed(file, error), now)
         else:
             self.alerts += taken.alerts
 
     def _note(self, file: File, now: float) -> None:
-        self.alerts += intake.note(self.store, file, GliderParams(), self.speaking, now).alerts
+        self.alerts += transaction.record_file(self.store, file, GliderParams(), self.speaking, now).alerts
 
     @property
     def unknown(self) -> list[Alert]:
@@ -170,7 +170,7 @@ def test_files_that_an_error_of_the_program_quarantines(copied, monkeypatch: pyt
     def broken(*_: object) -> None:
         raise ZeroDivisionError("float division by zero")
 
-    monkeypatch.setattr(intake, "process", broken)
+    monkeypatch.setattr(transaction, "process", broken)
     fed(live, files[onset(files) :])
     first = is_told_once_and_in_time(live, files)
     assert "ZeroDivisionError" in first.body and "please report it" in first.body
@@ -182,9 +182,11 @@ def test_dives_that_come_and_have_no_flag(copied) -> None:
     live = fed(Live([folder / "cache"]), files, onset(files))
     for path, at in files[onset(files) :]:
         segment = without(decode(path, [folder / "cache"]), "heading", "heading_commanded")
-        found = arrivals.judge(path, live.store, live.caches, lambda glider: True)
+        found = triage.triage(path, live.store, live.caches, lambda glider: True)
         assert isinstance(found, Job)
-        live.alerts += intake.take(live.store, found.file, segment, GliderParams(), live.speaking, at).alerts
+        live.alerts += transaction.process_file(
+            live.store, found.file, segment, GliderParams(), live.speaking, at
+        ).alerts
     first = is_told_once_and_in_time(live, files)
     assert "no heading for" in first.body and "add m_heading" in first.body
 

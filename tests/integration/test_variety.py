@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from gliderwatch.estimation.speed import NOT_FLOWN
-from gliderwatch.ingest.decode import decode
+from gliderwatch.estimation.verdict import NOT_FLOWN
 from gliderwatch.model import Assessment, Kind, Segment, Series, readonly
-from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Fault, FaultKind, Mission, Scenario
-from gliderwatch.simulate.sensors import CADENCE
+from gliderwatch.simulate.telemetry import CADENCE
+from gliderwatch.slocum.decode import decode
 from missions import feed
 
 AT_THE_SURFACE = (

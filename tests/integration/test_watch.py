@@ -10,8 +10,8 @@ from queue import Empty, Queue
 
 import pytest
 
-from gliderwatch.ingest.scan import Place, expand, scan
-from gliderwatch.ingest.watch import CacheChanged, Change, FileChanged, ScienceChanged, TreeChanged, Watcher
+from gliderwatch.slocum.folders import Place, expand, scan
+from gliderwatch.slocum.watch import CacheChanged, Change, FileChanged, ScienceChanged, TreeChanged, Watcher
 
 LONG = "electa-2022-308-3-2.sbd"
 SHORT = "00930002.sbd"

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gliderwatch.estimation.adaptive import AdaptiveParams, AdaptiveState, advance, init
 from gliderwatch.model import readonly
+from gliderwatch.papers.learner import AdaptiveParams, AdaptiveState, advance, init
 
 CENTRES = [[0.0, 0.0], [4e3, 1e3], [-2e3, -5e3]]
 

@@ -7,11 +7,11 @@ import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from gliderwatch.ingest.segment import QUANTITIES
 from gliderwatch.model import Segment
 from gliderwatch.params import GliderParams, LearnerParams
 from gliderwatch.pipeline import GliderState
-from gliderwatch.run.intake import Speaking
+from gliderwatch.service.routing import Routing
+from gliderwatch.slocum.sensors import QUANTITIES
 from gliderwatch.store import codec
 from missions import START, ending, feed, segment
 
@@ -61,7 +61,7 @@ def numbers(value: object):
         yield value
 
 
-SPEAKING = Speaking(channels=lambda alert: ["mail"], notices=lambda glider: True)
+SPEAKING = Routing(channels=lambda alert: ["mail"], notices=lambda glider: True)
 PARAMS = [
     GliderParams(),
     GliderParams(

@@ -4,11 +4,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gliderwatch.currents import augmented
-from gliderwatch.currents.augmented import Parameters
-from gliderwatch.currents.constituents import HOUR, Constituent
-from gliderwatch.currents.state import Currents, learn, predict
 from gliderwatch.model import readonly
+from gliderwatch.sea import flow_forecast
+from gliderwatch.sea.flow_forecast import Currents, Parameters, learn, predict
+from gliderwatch.sea.tides import HOUR, Constituent
 from gliderwatch.store import codec
 
 speeds = st.floats(-2.5, 2.5)
@@ -81,9 +80,9 @@ def test_time_passes_the_same_in_one_step_or_two(first, second, tau):
         *(readonly([[x, x]]) for x in (1e-9, 0.04)),
         readonly([Constituent.M2.omega, Constituent.K1.omega]),
     )
-    start = augmented.init(0.0, params)
-    start, _ = augmented.learn(start, 0.0, 1e4, np.array([0.3, 0.1]), 0.01, params)
-    once = augmented.at(start, 1e4 + first + second, params)
-    twice = augmented.at(augmented.at(start, 1e4 + first, params), 1e4 + first + second, params)
+    start = flow_forecast.init_belief(0.0, params)
+    start, _ = flow_forecast.learn_belief(start, 0.0, 1e4, np.array([0.3, 0.1]), 0.01, params)
+    once = flow_forecast.at(start, 1e4 + first + second, params)
+    twice = flow_forecast.at(flow_forecast.at(start, 1e4 + first, params), 1e4 + first + second, params)
     assert np.allclose(once.mean, twice.mean, atol=1e-9)
     assert np.allclose(once.cov, twice.cov, atol=1e-9)

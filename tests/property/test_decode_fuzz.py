@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 
 import dinkum
 from gliderwatch.errors import Quarantine, Retry
-from gliderwatch.ingest.cycles import intact, parse_sensor_list
-from gliderwatch.ingest.decode import Decoder
-from gliderwatch.ingest.header import parse_header, plain
-from gliderwatch.ingest.segment import QUANTITIES
 from gliderwatch.model import Segment
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, process
+from gliderwatch.slocum.cycles import intact, parse_sensor_list
+from gliderwatch.slocum.decode import Decoder
+from gliderwatch.slocum.header import parse_header, plain
+from gliderwatch.slocum.sensors import QUANTITIES
 
 CORPUS = Path(__file__).parents[1] / "corpus"
 CRC = "0abc12ef"

@@ -5,11 +5,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gliderwatch.forecast.state import LEAST, MOST, factor
-from gliderwatch.forecast.surfacing import Surfacings, expect, learn
+from gliderwatch.forecast.surfacing import LEAST, MOST, Surfacings, expect, factor, learn
 from gliderwatch.forecast.timing import KEPT, usual
 from gliderwatch.model import Dive, Unusable
-from gliderwatch.navigation.frame import from_plane
+from gliderwatch.navigation.geodesy import from_plane
 from gliderwatch.store import codec
 from joint_support import HOUR, LAT, LON, Way, mission
 

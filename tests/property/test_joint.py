@@ -5,9 +5,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gliderwatch.estimation.speed import SpeedParams, SpeedState, step
+from gliderwatch.estimation.verdict import SpeedParams, SpeedState, step
 from gliderwatch.model import Current, Dive, readonly
-from gliderwatch.navigation.frame import from_plane
+from gliderwatch.navigation.geodesy import from_plane
 from gliderwatch.store import codec
 from joint_support import Way, mission
 

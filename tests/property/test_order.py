@@ -9,12 +9,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from gliderwatch.estimation.glider import Estimate, step
+from gliderwatch.incidents.state_machine import RuleStates, advance
 from gliderwatch.model import Assessment, Incident, Segment
 from gliderwatch.navigation.dives import Navigation, extend
 from gliderwatch.params import AnomalyRule, FalseAlarmRule, GliderParams, RuleParams
 from gliderwatch.pipeline import digest
-from gliderwatch.rules.incident import Watches, judge
-from gliderwatch.run.intake import Speaking
+from gliderwatch.service.routing import Routing
 from gliderwatch.store import codec, segments
 from missions import REAL, Ending, Leg, cut, ending, feed, mission, real
 
@@ -81,10 +81,10 @@ def in_one_go(segments: list[Segment], params: GliderParams) -> tuple[list[Asses
         since = min((d.t_dive for d in told), default=math.inf)
         dives = {t: d for t, d in dives.items() if t < since or d.end is not None}
         dives |= {d.t_dive: d for d in told}
-    estimate, watches, assessments, incidents = Estimate(), Watches(), [], {}
+    estimate, watches, assessments, incidents = Estimate(), RuleStates(), [], {}
     for t in sorted(dives):
         estimate, assessment = step(estimate, dives[t], params, digest(params), bool(watches.open()))
-        watches, found = judge(watches, assessment, params.rules)
+        watches, found = advance(watches, assessment, params.rules)
         assessments.append(assessment)
         incidents |= {i.id: i for i in found}
     return assessments, sorted(incidents.values(), key=lambda i: (i.opened_at, i.id))
@@ -137,7 +137,7 @@ def test_with_many_segments_old_checkpoints_go():
 def test_no_message_twice_in_any_order(there):
     """Said after each input: what is said differs with the order, but never twice."""
     whole, order = there
-    spoken = Speaking(channels=lambda alert: ["mail"], notices=lambda glider: True)
+    spoken = Routing(channels=lambda alert: ["mail"], notices=lambda glider: True)
     store = feed(order, EAGER, spoken)
     ids = [a.id for a in store.alerts()]
     assert len(ids) == len(set(ids)) == len(store.undelivered())

@@ -11,20 +11,18 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from gliderwatch.ingest.decode import decode
-from gliderwatch.ingest.segment import QUANTITIES
 from gliderwatch.model import Segment
+from gliderwatch.simulate.delivery import FileForm, write_full_rate, write_mission
 from gliderwatch.simulate.dinkum import Generation
-from gliderwatch.simulate.dockserver import FileForm, write_full_rate, write_mission
-from gliderwatch.simulate.faults import SIZES
 from gliderwatch.simulate.flight import Thruster
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.ocean import Constituent, Ellipse, Front, Sea
 from gliderwatch.simulate.onboard import Point
-from gliderwatch.simulate.scenario import Fault, FaultKind, FixIn, Rates, Scenario
-from gliderwatch.simulate.sensors import SECONDS, SENSORS, TIME
-from gliderwatch.simulate.telemetry import SegmentData
+from gliderwatch.simulate.scenario import SIZES, Fault, FaultKind, FixIn, Rates, Scenario
+from gliderwatch.simulate.telemetry import SECONDS, SENSORS, TIME, SegmentData
 from gliderwatch.simulate.water import Bottom
+from gliderwatch.slocum.decode import decode
+from gliderwatch.slocum.sensors import QUANTITIES
 
 SENT = sorted({sensor.name for sensor in SENSORS} - {TIME, SECONDS})
 PAIRS = [

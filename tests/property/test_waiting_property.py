@@ -8,8 +8,8 @@ from zoneinfo import ZoneInfo
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gliderwatch.incidents.send_schedule import QuietHours
 from gliderwatch.model import Severity
-from gliderwatch.rules.waiting import QuietHours
 
 HOUR = 3600.0
 ZONES = (

@@ -7,9 +7,9 @@ import pytest
 from ruamel.yaml import YAML
 
 from euler import euler_step
-from gliderwatch.estimation.adaptive import AdaptiveParams, advance, init, with_basis
-from gliderwatch.estimation.basis import phi
 from gliderwatch.model import readonly
+from gliderwatch.papers.basis import phi
+from gliderwatch.papers.learner import AdaptiveParams, advance, init, with_basis
 
 TABLE_I = AdaptiveParams(13e3, "exponential", omega=2e-6 * math.pi, nu=0.0, k=0.003, gamma=5e-7)
 TIDAL = AdaptiveParams(3e3, "gaussian", omega=1.4e-4, nu=0.3, k=0.003, gamma=5e-6, speed_gain=2e-6)

@@ -5,13 +5,13 @@ from dataclasses import replace
 import pytest
 
 from announcing import HOUR, STEP, Talk, World, dive
-from gliderwatch.model import Expected, Severity, Unusable
-from gliderwatch.rules.announce import NEWS, Said
+from gliderwatch.incidents.notifications import NEWS, NotificationState
+from gliderwatch.model import NextSurfacing, Severity, Unusable
 
 
 def test_nothing_known_nothing_said():
     talk = Talk(notices=True)
-    assert talk.hear("") == [] and talk.said == Said()
+    assert talk.hear("") == [] and talk.said == NotificationState()
 
 
 def test_an_incident_from_its_opening_to_its_end():
@@ -186,11 +186,11 @@ class TestNotices:
     def test_it_tells_the_next_one_if_that_is_known(self):
         world, talk = World.of("00"), Talk(notices=True)
         last = max(a.t_surface for a in world.dives.values())
-        world.next = Expected(last + 60, last + 3 * 3600, 600.0, 27.5, -84.0, 1e4, 0.0, 1e4, "test")
+        world.next = NextSurfacing(last + 60, last + 3 * 3600, 600.0, 27.5, -84.0, 1e4, 0.0, 1e4, "test")
         talk.hear(world)
         assert "Next surfacing" in talk.alerts[-1].body and "084° 00.000' W" in talk.alerts[-1].body
         world, talk = World.of("00"), Talk(notices=True)
-        world.next = Expected(last - 7200, last, 600.0, 27.5, -84.0, 1e4, 0.0, 1e4, "of an earlier one")
+        world.next = NextSurfacing(last - 7200, last, 600.0, 27.5, -84.0, 1e4, 0.0, 1e4, "of an earlier one")
         talk.hear(world)
         assert "Next surfacing" not in talk.alerts[-1].body
 

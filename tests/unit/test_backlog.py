@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from gliderwatch.errors import Quarantine
-from gliderwatch.ingest.header import Header
 from gliderwatch.model import SegmentId
-from gliderwatch.run.backlog import AHEAD, Backlog, Job
-from gliderwatch.store.sqlite import File, Status
+from gliderwatch.service.triage import AHEAD, Backlog, Job
+from gliderwatch.slocum.header import Header
+from gliderwatch.store.state_file import File, Status
 
 DONE = Quarantine("for the sake of the test")
 

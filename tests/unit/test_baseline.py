@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gliderwatch.alerts.usual import usual
-from gliderwatch.estimation import baseline
-from gliderwatch.estimation.baseline import Baseline, learn, told
+from gliderwatch.estimation import healthy_baseline
+from gliderwatch.estimation.healthy_baseline import Baseline, learn, told
+from gliderwatch.messages.evidence import usual
 from gliderwatch.model import Dive, DiveFeatures
 from gliderwatch.navigation.dives import Navigation, extend
 from gliderwatch.navigation.features import evidence
@@ -45,8 +45,8 @@ def taught(dives: list[dict[str, float]], known: Baseline | None = None) -> Base
     return known
 
 
-def compare(known: Baseline, dive: dict[str, float]) -> dict[str, baseline.Usual]:
-    return baseline.compare(known, DiveFeatures(**dive))
+def compare(known: Baseline, dive: dict[str, float]) -> dict[str, healthy_baseline.Usual]:
+    return healthy_baseline.compare(known, DiveFeatures(**dive))
 
 
 def outside(known: Baseline, **changes: float) -> set[str]:
@@ -55,7 +55,7 @@ def outside(known: Baseline, **changes: float) -> set[str]:
 
 def test_nothing_is_usual_before_enough_dives() -> None:
     assert compare(taught(healthy(4)), DIVE) == {}
-    assert set(compare(taught(healthy(5)), DIVE)) == {q.name for q in baseline.QUANTITIES}
+    assert set(compare(taught(healthy(5)), DIVE)) == {q.name for q in healthy_baseline.QUANTITIES}
 
 
 def test_a_healthy_dive_is_as_usual() -> None:
@@ -157,7 +157,7 @@ def test_memory_is_bounded_and_survives_the_state_file() -> None:
     known = Baseline()
     for k in range(40):
         known = taught(healthy(30, seed=k, thruster=k / 40), known)
-    assert len(known.dives) <= baseline.MOST
+    assert len(known.dives) <= healthy_baseline.MOST
     assert not known.dives.flags.writeable
     again = codec.decode(codec.encode(known), Baseline)
     assert np.array_equal(again.dives, known.dives)

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from gliderwatch.estimation.basis import Basis, new_centres, phi
+from gliderwatch.papers.basis import Basis, new_centres, phi
 
 TWO = np.array([[0.0, 0.0], [3000.0, 4000.0]])
 

@@ -12,7 +12,7 @@ import pytest
 
 from gliderwatch.config import Config, load
 from gliderwatch.config.loading import presets_path
-from gliderwatch.config.sections import Adaptive, Anomaly, FalseAlarm
+from gliderwatch.config.schema import Adaptive, Anomaly, FalseAlarm
 from gliderwatch.errors import ConfigError
 from gliderwatch.model import Severity
 from gliderwatch.params import AnomalyRule, Attention, FalseAlarmRule, GliderParams, LearnerParams

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from gliderwatch.cli.doctor import examine
 from gliderwatch.config import Problem, load
-from gliderwatch.run.doctor import examine
-from gliderwatch.run.preconditions import check
+from gliderwatch.service.preconditions import check
 
 TEXT = """\
 dockserver:

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from gliderwatch.detection.consistency import Blame, Misfit, blame, disagrees, misfit
+from gliderwatch.estimation.verdict import Blame, Misfit, blame, disagrees, misfit
 
 GATE = {"gate": 4.0, "least": 0.05}
 GOOD = Misfit(along=0.25, across=0.002, sigma=0.01, heading=0.3)

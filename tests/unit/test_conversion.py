@@ -11,14 +11,14 @@ import msgspec
 import pytest
 
 from gliderwatch.errors import LayoutError, StateError
-from gliderwatch.model import Alert, Assessment, Expected, Incident, Kind, Segment
+from gliderwatch.incidents.acknowledgement import Ack
+from gliderwatch.incidents.notifications import NotificationState
+from gliderwatch.model import Alert, Assessment, Incident, Kind, NextSurfacing, Segment
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, process
-from gliderwatch.rules.acknowledged import Ack
-from gliderwatch.rules.announce import Said
 from gliderwatch.store import codec, conversion, database
 from gliderwatch.store.conversion import converted, moved, version
-from gliderwatch.store.sqlite import Store
+from gliderwatch.store.state_file import Store
 from missions import Leg, mission
 
 LAYOUTS = Path(__file__).parents[1] / "golden" / "layouts"
@@ -26,8 +26,8 @@ RECORDS = {GliderState: "checkpoint", Segment: "segment"}
 ROWS = {
     Assessment: "assessments",
     Incident: "incidents",
-    Expected: "expected",
-    Said: "said",
+    NextSurfacing: "expected",
+    NotificationState: "said",
     Ack: "acks",
     Alert: "alerts",
 }
@@ -199,7 +199,7 @@ def test_a_migration_converts_the_text_of_rows(tmp_path, monkeypatch):
     monkeypatch.setattr(
         database, "MIGRATIONS", {database.SCHEMA: "UPDATE said SET data = said_of_old(data);"}
     )
-    assert Store.open(path).said("unit") == Said(surfaced=5.5)
+    assert Store.open(path).said("unit") == NotificationState(surfaced=5.5)
 
 
 def test_a_migration_whose_converter_fails_changes_nothing(tmp_path, monkeypatch):

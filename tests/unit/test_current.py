@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gliderwatch.model import Current
-from gliderwatch.navigation.current import EARLY, Report, new_reports, pair, updated
+from gliderwatch.navigation.dac import EARLY, Report, new_reports, pair, updated
 from missions import segment
 
 NONE = (None, None)

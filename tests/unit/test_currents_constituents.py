@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gliderwatch.currents.constituents import HOUR, Constituent, aliasing, smoothing
+from gliderwatch.sea.tides import HOUR, Constituent, aliasing, smoothing
 from gliderwatch.simulate import ocean
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gliderwatch.currents.field import Field
 from gliderwatch.model import Fix, readonly
+from gliderwatch.sea.ocean_field import Field
 
 HOUR = 3600.0
 T0 = 1_714_521_600.0  # 2024-05-01

@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gliderwatch.currents import bank
-from gliderwatch.currents.constituents import HOUR, Constituent
-from gliderwatch.currents.state import (
+from gliderwatch.sea import flow_forecast
+from gliderwatch.sea.flow_forecast import (
     ENOUGH,
     TIDAL_GRID,
     Currents,
@@ -19,6 +18,7 @@ from gliderwatch.currents.state import (
     learn,
     predict,
 )
+from gliderwatch.sea.tides import HOUR, Constituent
 from gliderwatch.store import codec
 
 START = 1_700_000_000.0
@@ -219,45 +219,45 @@ def test_persistence_is_less_certain_where_the_residual_differs_from_it():
 
 
 def test_sets_that_differ_make_the_forecast_less_certain():
-    grid = bank.grid([0.02], [HOUR, 1e4 * HOUR], ((0.0, 0.0),), ())
-    one = bank.init(START, grid)
+    grid = flow_forecast.grid([0.02], [HOUR, 1e4 * HOUR], ((0.0, 0.0),), ())
+    one = flow_forecast.init_bank(START, grid)
     for k in range(3):
         start = START + 3 * k * HOUR
-        one, _ = bank.learn(one, start, start + 3 * HOUR, np.array([0.5, 0.0]), 0.006, k, grid)
+        one, _ = flow_forecast.learn_bank(one, start, start + 3 * HOUR, np.array([0.5, 0.0]), 0.006, k, grid)
     one = replace(one, fit=np.zeros(2))
-    told = bank.forecast(one, one.t + 12 * HOUR, one.t + 13 * HOUR, grid)
+    told = flow_forecast.forecast_bank(one, one.t + 12 * HOUR, one.t + 13 * HOUR, grid)
     assert told.mean[0] == pytest.approx(0.25, abs=0.03)  # one says 0.5, the other nothing
     assert told.cov[0, 0] - told.cov[1, 1] == pytest.approx(0.25**2, rel=0.2)
 
 
 def test_no_dive_however_wild_decides_alone():
-    grid = bank.grid([0.02], [30 * HOUR], ((0.0, 0.0),), ())
-    one = bank.init(START, grid)
-    usual, _ = bank.learn(one, START, START + 3 * HOUR, np.zeros(2), 0.006, 0, grid)
-    wild, _ = bank.learn(one, START, START + 3 * HOUR, np.array([2.0, 2.0]), 0.006, 0, grid)
+    grid = flow_forecast.grid([0.02], [30 * HOUR], ((0.0, 0.0),), ())
+    one = flow_forecast.init_bank(START, grid)
+    usual, _ = flow_forecast.learn_bank(one, START, START + 3 * HOUR, np.zeros(2), 0.006, 0, grid)
+    wild, _ = flow_forecast.learn_bank(one, START, START + 3 * HOUR, np.array([2.0, 2.0]), 0.006, 0, grid)
     assert 5 < usual.fit[0] - wild.fit[0] < 40
 
 
 def test_the_scale_of_the_sea_is_learnt():
     """Of a set that changes by 2 cm/s in 3 h: 1 where the sea does so, 4 where it is twice as restless."""
-    grid = bank.grid([0.02], [30 * HOUR], ((0.0, 0.0),), ())
+    grid = flow_forecast.grid([0.02], [30 * HOUR], ((0.0, 0.0),), ())
     for size, expected in ((0.0454, 1.0), (0.0907, 4.0)):
         state = None
         for dives, (start, end, current) in enumerate(wandering(200, seed=4, size=size)):
-            state = state if state is not None else bank.init(start, grid)
-            state, _ = bank.learn(state, start, end, current, 0.006, dives, grid)
+            state = state if state is not None else flow_forecast.init_bank(start, grid)
+            state, _ = flow_forecast.learn_bank(state, start, end, current, 0.006, dives, grid)
         assert state.scale[0] == pytest.approx(expected, rel=0.4)
 
 
 def test_the_likeliest_set_is_the_one_that_made_the_sea():
-    grid = bank.grid([0.02], [30 * HOUR], ((0.02, 0.1), (0.3, 0.1)), [Constituent.M2])
+    grid = flow_forecast.grid([0.02], [30 * HOUR], ((0.02, 0.1), (0.3, 0.1)), [Constituent.M2])
     for tide, expected in ((0.0, 0), (0.4, 1)):
         state = None
         for dives, (start, end, current) in enumerate(wandering(60, seed=4, tide=tide, size=0.045)):
-            state = state if state is not None else bank.init(start, grid)
-            state, _ = bank.learn(state, start, end, current, 0.006, dives, grid)
-        assert np.argmax(bank.weights(state)) == expected
-        assert bank.weights(state).sum() == pytest.approx(1.0)
+            state = state if state is not None else flow_forecast.init_bank(start, grid)
+            state, _ = flow_forecast.learn_bank(state, start, end, current, 0.006, dives, grid)
+        assert np.argmax(flow_forecast.weights(state)) == expected
+        assert flow_forecast.weights(state).sum() == pytest.approx(1.0)
 
 
 def test_a_checkpoint_stays_small():

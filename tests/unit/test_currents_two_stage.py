@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from gliderwatch.currents import two_stage
-from gliderwatch.currents.constituents import HOUR, Constituent
-from gliderwatch.currents.two_stage import TwoStageParams
+from gliderwatch.papers import two_stage
+from gliderwatch.papers.two_stage import TwoStageParams
+from gliderwatch.sea.tides import HOUR, Constituent
 
 T = np.array([0.0, 3.0, 6.2, 9.2, 12.5]) * HOUR
 X = np.array([0.0, 1.0, 1.0, 1.0, 0.0])

@@ -1,7 +1,7 @@
 import pytest
 
 import dinkum
-from gliderwatch.ingest.cycles import intact, parse_sensor_list
+from gliderwatch.slocum.cycles import intact, parse_sensor_list
 
 SENSORS, LENGTH = parse_sensor_list(dinkum.sensor_list(), 0, len(dinkum.SENSORS) + 1)
 

@@ -19,14 +19,14 @@ from types import ModuleType
 import pytest
 from ruamel.yaml import YAML
 
-from gliderwatch.cli import main
+from gliderwatch.cli.main import main
 from gliderwatch.config import load
 from gliderwatch.model import Kind
-from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
 from gliderwatch.store.database import MIGRATIONS, schema
-from gliderwatch.store.sqlite import Status
+from gliderwatch.store.state_file import Status
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

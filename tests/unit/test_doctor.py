@@ -16,12 +16,8 @@ import pytest
 
 import dinkum
 from alert_support import alert
-from gliderwatch.config import load
-from gliderwatch.ingest.scan import find_places, scan
-from gliderwatch.ingest.segment import SENSORS
-from gliderwatch.run import doctor
-from gliderwatch.run.doctor import data, machine, service
-from gliderwatch.run.doctor.finding import (
+from gliderwatch.cli import doctor, doctor_checks
+from gliderwatch.cli.doctor_checks import (
     Finding,
     Level,
     as_lines,
@@ -32,10 +28,13 @@ from gliderwatch.run.doctor.finding import (
     report,
     warning,
 )
-from gliderwatch.run.life import Life, alive_path
-from gliderwatch.run.preconditions import check
+from gliderwatch.config import load
+from gliderwatch.service.liveness import PidLock, alive_path
+from gliderwatch.service.preconditions import check
+from gliderwatch.slocum.folders import find_places, scan
+from gliderwatch.slocum.sensors import SENSORS
 from gliderwatch.store import outbox
-from gliderwatch.store.sqlite import Store
+from gliderwatch.store.state_file import Store
 
 TEXT = """\
 dockserver:
@@ -51,7 +50,11 @@ recipients:
 NOW = 1_800_000_000.0
 Usage = namedtuple("Usage", "total used free")
 Doctor = Callable[..., list[Finding]]
-ALL = tuple((names[0], 4, "m") for table in (data.NEEDED, data.WANTED, data.USEFUL) for names in table)
+ALL = tuple(
+    (names[0], 4, "m")
+    for table in (doctor_checks.NEEDED, doctor_checks.WANTED, doctor_checks.USEFUL)
+    for names in table
+)
 SENSORS_OF_ALL = tuple(dict.fromkeys(ALL))
 
 
@@ -77,9 +80,9 @@ def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (tmp_path / folder).mkdir(parents=True)
     put(tmp_path)
     Store.open(tmp_path / "state" / "s.sqlite").close()
-    monkeypatch.setattr(machine, "_ntp", lambda: "yes")
-    monkeypatch.setattr(machine, "_limit", lambda name: 8192)
-    monkeypatch.setattr(machine, "_file_system", lambda path: "ext4")
+    monkeypatch.setattr(doctor, "_ntp", lambda: "yes")
+    monkeypatch.setattr(doctor, "_limit", lambda name: 8192)
+    monkeypatch.setattr(doctor, "_file_system", lambda path: "ext4")
     return tmp_path
 
 
@@ -97,7 +100,7 @@ def examined(tree: Path) -> Doctor:
     ) -> list[Finding]:
         path = tree / "c.yml"
         path.write_text(text, encoding="utf-8")
-        life = Life(tree / "state" / "s.sqlite") if runs else None
+        life = PidLock(tree / "state" / "s.sqlite") if runs else None
         if life is not None:
             life.beat()
         before = files(tree)
@@ -168,7 +171,7 @@ def test_what_check_finds_is_told_under_its_topic(examined: Doctor) -> None:
 
 
 def test_an_old_python(examined: Doctor, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(machine, "PYTHON", (4, 0))
+    monkeypatch.setattr(doctor, "PYTHON", (4, 0))
     assert one(examined(), Level.ERROR, "program", "gliderwatch ")
 
 
@@ -220,7 +223,7 @@ def test_a_folder_that_is_closed_to_its_owner_or_its_group(closed: Callable[...,
 def test_the_cure_of_a_closed_folder_is_never_a_privilege(
     closed: Callable[..., list[Finding]], monkeypatch: pytest.MonkeyPatch, gid: int, mode: int, group: str
 ) -> None:
-    monkeypatch.setattr(machine, "_group", lambda gid: group)
+    monkeypatch.setattr(doctor, "_group", lambda gid: group)
     (finding,) = closed(gid=gid, mode=mode)
     assert f"(root:{group}, mode {mode:04o}) is closed to 4000001" in finding.text
     assert finding.cure.startswith("setfacl -R -m u:4000001:rX ")
@@ -263,7 +266,7 @@ def test_root_is_told_that_it_sees_too_much(examined: Doctor, monkeypatch: pytes
 def test_too_few_watches(
     examined: Doctor, monkeypatch: pytest.MonkeyPatch, allowed: int, level: Level | None
 ) -> None:
-    monkeypatch.setattr(machine, "_limit", lambda name: allowed)  # gliders, two below it, the cache
+    monkeypatch.setattr(doctor, "_limit", lambda name: allowed)  # gliders, two below it, the cache
     found = examined()
     if level is None:
         assert found == []
@@ -274,7 +277,7 @@ def test_too_few_watches(
 
 
 def test_a_share_on_which_inotify_sees_nothing(examined: Doctor, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(machine, "_file_system", lambda path: "nfs4")
+    monkeypatch.setattr(doctor, "_file_system", lambda path: "nfs4")
     found = examined()
     assert one(found, Level.WARNING, "inotify", "nfs4")
     assert "polling" in found[0].cure
@@ -287,9 +290,9 @@ def test_the_file_system_of_a_path_is_that_of_the_nearest_mount(
     mounts.write_text(
         "1 0 8:1 / / rw - ext4 /dev/sda rw\n2 1 0:5 / /mnt/my\\040share rw shared:1 - nfs4 host:/x rw\n"
     )
-    monkeypatch.setattr(machine, "_MOUNTS", mounts)
-    assert machine._file_system(Path("/mnt/my share/gliders")) == "nfs4"
-    assert machine._file_system(Path("/mnt/other")) == "ext4"
+    monkeypatch.setattr(doctor, "_MOUNTS", mounts)
+    assert doctor._file_system(Path("/mnt/my share/gliders")) == "nfs4"
+    assert doctor._file_system(Path("/mnt/other")) == "ext4"
 
 
 def test_cache_files_that_are_missing(examined: Doctor, tree: Path) -> None:
@@ -304,7 +307,7 @@ def test_cache_files_that_are_missing(examined: Doctor, tree: Path) -> None:
 def test_only_the_newest_headers_are_read(
     examined: Doctor, tree: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(data, "MOST_READ", 1)
+    monkeypatch.setattr(doctor_checks, "MOST_READ", 1)
     old = put(tree, name="electa-2025-1-0-0", crc="deadbeef")
     (tree / "cache" / "deadbeef.cac").unlink()
     os.utime(old, (0, 0))
@@ -397,19 +400,24 @@ def test_a_file_that_holds_its_own_sensor_list(examined: Doctor, tree: Path) -> 
 
 
 def test_the_sensors_asked_for_are_those_that_are_read() -> None:
-    asked = {name for table in (data.NEEDED, data.WANTED, data.USEFUL) for names in table for name in names}
+    asked = {
+        name
+        for table in (doctor_checks.NEEDED, doctor_checks.WANTED, doctor_checks.USEFUL)
+        for names in table
+        for name in names
+    }
     assert asked <= set(SENSORS)
 
 
 def test_the_clock(examined: Doctor, tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert [f.level for f in machine.clock({}, 1e9)] == [Level.ERROR]
+    assert [f.level for f in doctor.clock({}, 1e9)] == [Level.ERROR]
     path = put(tree)
     os.utime(path, (time.time() + 7200, time.time() + 7200))
     assert one(examined(), Level.WARNING, "clock", path.name, "2.0 h in the future")
     os.utime(path)
-    monkeypatch.setattr(machine, "_ntp", lambda: "no")
+    monkeypatch.setattr(doctor, "_ntp", lambda: "no")
     assert one(examined(), Level.WARNING, "clock", "not synchronised")
-    monkeypatch.setattr(machine, "_ntp", lambda: None)
+    monkeypatch.setattr(doctor, "_ntp", lambda: None)
     assert examined() == []
 
 
@@ -418,7 +426,7 @@ def test_timedatectl_is_asked(monkeypatch: pytest.MonkeyPatch, output: str, told
     monkeypatch.setattr(
         subprocess, "run", lambda command, **_: subprocess.CompletedProcess(command, 0, output, "")
     )
-    assert machine._ntp() == told
+    assert doctor._ntp() == told
 
 
 def test_a_disk_nearly_full(examined: Doctor, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -427,7 +435,7 @@ def test_a_disk_nearly_full(examined: Doctor, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_a_file_system_that_cannot_be_written(examined: Doctor, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(machine.shutil, "disk_usage", lambda _: Usage(9e9, 1e9, 8e9))
+    monkeypatch.setattr(doctor.shutil, "disk_usage", lambda _: Usage(9e9, 1e9, 8e9))
     status = namedtuple("status", "f_flag f_files f_favail")
     monkeypatch.setattr(os, "statvfs", lambda _: status(os.ST_RDONLY, 10, 10))
     assert one(examined(), Level.ERROR, "disk", "read-only")
@@ -439,7 +447,7 @@ def test_no_room_for_temporary_files(examined: Doctor, monkeypatch: pytest.Monke
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(machine.tempfile, "TemporaryFile", full)
+    monkeypatch.setattr(doctor.tempfile, "TemporaryFile", full)
     assert one(examined(), Level.ERROR, "disk", "No space left")
 
 
@@ -489,16 +497,16 @@ def test_a_test_message_goes_through_each_channel_only_when_asked(
     examined: Doctor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sent: list[str] = []
-    monkeypatch.setattr(service.Channel, "send", lambda self, alert: sent.append(self.name))
+    monkeypatch.setattr(doctor_checks.Channel, "send", lambda self, alert: sent.append(self.name))
     assert examined() == []
     assert sent == []
     assert examined(send=True) == []
     assert sent == ["hook"]
 
     def refuse(*_: object) -> None:
-        raise service.DeliveryError("550 no")
+        raise doctor_checks.DeliveryError("550 no")
 
-    monkeypatch.setattr(service.Channel, "send", refuse)
+    monkeypatch.setattr(doctor_checks.Channel, "send", refuse)
     assert one(examined(send=True), Level.ERROR, "channels", "550 no")
 
 
@@ -506,7 +514,7 @@ def test_the_server_of_a_mail_channel_is_asked_without_sending(
     examined: Doctor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sent: list[str] = []
-    monkeypatch.setattr(service.Channel, "send", lambda self, alert: sent.append(self.name))
+    monkeypatch.setattr(doctor_checks.Channel, "send", lambda self, alert: sent.append(self.name))
     text = TEXT.replace("json://127.0.0.1:1/x", "'mailto://127.0.0.1:9?from=a@b.org&to=c@d.org'")
     assert one(examined(text), Level.ERROR, "channels", "hook cannot be used: mail server 127.0.0.1:9")
     assert sent == []
@@ -538,7 +546,7 @@ def test_a_heartbeat_that_can_be_given(examined: Doctor) -> None:
 def test_a_service_that_does_not_run_or_is_stuck(examined: Doctor, tree: Path) -> None:
     assert one(examined(runs=False), Level.WARNING, "service", "does not run")
     path = tree / "state" / "s.sqlite"
-    life = Life(path)
+    life = PidLock(path)
     os.utime(alive_path(path), (0, time.time() - 500))
     assert one(examined(runs=False), Level.ERROR, "service", "no sign of life for 8 min")
     life.end()
@@ -547,7 +555,7 @@ def test_a_service_that_does_not_run_or_is_stuck(examined: Doctor, tree: Path) -
 def test_what_nobody_foresaw_hides_nothing_of_the_rest(
     examined: Doctor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(machine, "user", lambda config: 1 / 0)
+    monkeypatch.setattr(doctor, "user", lambda config: 1 / 0)
     found = examined(runs=False)
     assert [(f.level, f.topic) for f in found] == [(Level.ERROR, "user"), (Level.WARNING, "service")]
     assert "ZeroDivisionError" in found[0].text

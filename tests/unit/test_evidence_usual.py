@@ -5,9 +5,8 @@ from dataclasses import replace
 import pytest
 
 from alert_support import DISAGREE, SLOW
-from gliderwatch.alerts.evidence import how_sure, weigh
-from gliderwatch.alerts.usual import WORDINGS, usual
-from gliderwatch.estimation.baseline import QUANTITIES, Baseline, learn, told
+from gliderwatch.estimation.healthy_baseline import QUANTITIES, Baseline, learn, told
+from gliderwatch.messages.evidence import WORDINGS, how_sure, usual, weigh
 from gliderwatch.model import Assessment, DiveFeatures, Kind
 from gliderwatch.navigation.features import evidence
 

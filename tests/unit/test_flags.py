@@ -2,8 +2,8 @@ import math
 
 import pytest
 
-from gliderwatch.detection.flags import FlowMaxima, flag, p_e, update
 from gliderwatch.model import Flag
+from gliderwatch.papers.flags import FlowMaxima, flag, p_e, update
 
 RANGE = {"speed_min": 0.15, "speed_max": 0.25}
 

@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
 
-from gliderwatch.estimation import joint
-from gliderwatch.estimation.ahead import mean_flow
-from gliderwatch.estimation.joint import JointParams
+from gliderwatch.estimation import kalman
+from gliderwatch.estimation.kalman import JointParams, expected_flow
 from joint_support import HOUR, Way, mission
 
 PARAMS = JointParams()
@@ -13,18 +12,18 @@ PARAMS = JointParams()
 def state():
     found = None
     for dive in mission([Way(flow=(0.2, -0.1))] * 30):
-        found, _ = joint.step(found, dive, PARAMS)
+        found, _ = kalman.step(found, dive, PARAMS)
     return found
 
 
 def test_a_steady_flow_goes_on(state):
-    mean, _ = mean_flow(state, PARAMS.flow, np.zeros(2), state.t, state.t + 3 * HOUR)
+    mean, _ = expected_flow(state, PARAMS.flow, np.zeros(2), state.t, state.t + 3 * HOUR)
     assert mean == pytest.approx([0.2, -0.1], abs=0.03)
 
 
 def test_the_further_ahead_the_less_is_known(state):
     ahead = [
-        mean_flow(state, PARAMS.flow, np.zeros(2), state.t + h * HOUR, state.t + (h + 3) * HOUR)[1]
+        expected_flow(state, PARAMS.flow, np.zeros(2), state.t + h * HOUR, state.t + (h + 3) * HOUR)[1]
         for h in (0, 6, 24)
     ]
     widths = [np.trace(cov) for cov in ahead]
@@ -33,7 +32,7 @@ def test_the_further_ahead_the_less_is_known(state):
 
 def test_a_strong_current_is_less_known_where_the_glider_is_carried_on(state):
     still, carried = (
-        mean_flow(state, PARAMS.flow, np.array([east, 0.0]), state.t, state.t + 6 * HOUR)[1]
+        expected_flow(state, PARAMS.flow, np.array([east, 0.0]), state.t, state.t + 6 * HOUR)[1]
         for east in (0.0, 1.0)
     )
     assert np.trace(carried) > np.trace(still)
@@ -50,8 +49,8 @@ def test_forecast_errors_are_as_large_as_said():
     found, squares = None, []
     for dive, way in zip(mission(ways), ways, strict=True):
         if found is not None and found.dives > 20:
-            mean, cov = mean_flow(found, PARAMS.flow, np.zeros(2), dive.t_dive, dive.t_surface)
+            mean, cov = expected_flow(found, PARAMS.flow, np.zeros(2), dive.t_dive, dive.t_surface)
             off = np.array(way.flow) - mean
             squares.append(off @ np.linalg.solve(cov, off) / 2)
-        found, _ = joint.step(found, dive, PARAMS)
+        found, _ = kalman.step(found, dive, PARAMS)
     assert 0.5 < np.mean(squares) < 1.5

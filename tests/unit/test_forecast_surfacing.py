@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from gliderwatch.forecast.surfacing import Surfacings, expect, learn
-from gliderwatch.model import Expected, Fix, Unusable
-from gliderwatch.navigation.frame import from_plane, to_plane
+from gliderwatch.model import Fix, NextSurfacing, Unusable
+from gliderwatch.navigation.geodesy import from_plane, to_plane
 from joint_support import DAY, HOUR, LAT, LON, START, Way, dive, mission
 
 SPEED, SIGMA = 0.25, 0.005
@@ -25,11 +25,11 @@ def after(dives, waypoint=None):
     return state
 
 
-def way(expected: Expected, fix: Fix) -> np.ndarray:
+def way(expected: NextSurfacing, fix: Fix) -> np.ndarray:
     return to_plane(expected.lat, expected.lon, fix.lat, fix.lon)
 
 
-def axes(expected: Expected) -> np.ndarray:
+def axes(expected: NextSurfacing) -> np.ndarray:
     cov = np.array([[expected.east, expected.cross], [expected.cross, expected.north]])
     return np.sqrt(np.linalg.eigvalsh(cov))
 

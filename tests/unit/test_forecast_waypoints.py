@@ -1,6 +1,6 @@
 import numpy as np
 
-from gliderwatch.forecast.waypoints import KEPT, bound_for, heard
+from gliderwatch.forecast.surfacing import KEPT, active_waypoint, read_waypoints
 from gliderwatch.model import Segment, SegmentId, Series, readonly
 
 
@@ -14,25 +14,25 @@ def segment(*reports):
 
 
 def test_waypoint_at_a_fix_is_not_one_told_on_the_dive_after_it():
-    known = heard((), segment((0.0, 27.0, -84.0), (20000.0, 28.0, -84.0)))
-    assert bound_for(known, 10000.0) == (27.0, -84.0)
-    assert bound_for(known, 20000.0) == (28.0, -84.0)
+    known = read_waypoints((), segment((0.0, 27.0, -84.0), (20000.0, 28.0, -84.0)))
+    assert active_waypoint(known, 10000.0) == (27.0, -84.0)
+    assert active_waypoint(known, 20000.0) == (28.0, -84.0)
 
 
 def test_none_before_any_is_told():
-    assert bound_for(heard((), segment()), 1e9) is None
-    assert bound_for(((5000.0, 27.0, -84.0),), 0.0) is None
+    assert active_waypoint(read_waypoints((), segment()), 1e9) is None
+    assert active_waypoint(((5000.0, 27.0, -84.0),), 0.0) is None
 
 
 def test_any_order_of_segments_tells_the_same():
     one, two = segment((0.0, 27.0, -84.0), (50.0, 27.0, -84.0)), segment((100.0, 28.0, -84.0))
-    assert heard(heard((), one), two) == heard(heard((), two), one)
+    assert read_waypoints(read_waypoints((), one), two) == read_waypoints(read_waypoints((), two), one)
 
 
 def test_repeated_reports_are_left_out_and_old_ones_forgotten():
     known = ()
     for k in range(3 * KEPT):
-        known = heard(known, segment((float(k), 27.0 + k // 2, -84.0)))
+        known = read_waypoints(known, segment((float(k), 27.0 + k // 2, -84.0)))
     assert len(known) == KEPT
     assert len({report[1:] for report in known}) == KEPT
 
@@ -40,4 +40,4 @@ def test_repeated_reports_are_left_out_and_old_ones_forgotten():
 def test_a_latitude_without_its_longitude_is_not_a_waypoint():
     whole = segment((0.0, 27.0, -84.0))
     half = {"waypoint_lat": whole.get("waypoint_lat")}
-    assert heard((), Segment(whole.id, "unit.mi", "sbd", 0.0, (0, 0, ""), half)) == ()
+    assert read_waypoints((), Segment(whole.id, "unit.mi", "sbd", 0.0, (0, 0, ""), half)) == ()

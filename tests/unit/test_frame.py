@@ -5,7 +5,7 @@ from math import atan, atan2, cos, degrees, hypot, pi, radians, sin, sqrt, tan
 import numpy as np
 import pytest
 
-from gliderwatch.navigation.frame import from_plane, heading_vectors, magnetic_to_true, to_plane
+from gliderwatch.navigation.geodesy import from_plane, heading_vectors, magnetic_to_true, to_plane
 
 A, F = 6378137.0, 1 / 298.257223563
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gliderwatch.currents.field import Field
 from gliderwatch.estimation.glider import Estimate, step
 from gliderwatch.model import Assessment, Dive, readonly
 from gliderwatch.params import GliderParams
+from gliderwatch.sea.ocean_field import Field
 from joint_support import DAY, LAT, LON, START, mission, ways
 
 STRAIGHT = mission(ways(16, 3, lambda k: 0.4 * k))

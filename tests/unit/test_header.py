@@ -7,9 +7,9 @@ import pytest
 
 import dinkum
 from gliderwatch.errors import Quarantine, Retry
-from gliderwatch.ingest import header as header_module
-from gliderwatch.ingest.header import read_header, read_regular
 from gliderwatch.model import SegmentId
+from gliderwatch.slocum import header as header_module
+from gliderwatch.slocum.header import read_header, read_regular
 
 
 @pytest.fixture

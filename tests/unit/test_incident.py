@@ -7,9 +7,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from alert_support import SLOW
+from gliderwatch.incidents.state_machine import (
+    TRANSITIONS,
+    Event,
+    Phase,
+    RuleStates,
+    advance,
+    departure,
+    is_severe,
+)
 from gliderwatch.model import Assessment, Incident, Kind, Severity
 from gliderwatch.params import AnomalyRule, FalseAlarmRule, RuleParams
-from gliderwatch.rules.incident import TRANSITIONS, Event, Phase, Watches, departure, is_severe, judge
 
 SPEEDS = {"0": 0.25, "1": 0.15, "S": 0.05, "F": 0.4, "2": 0.25, "-": None}
 """Dives by a letter: normal, slow, less than half the lower bound, fast, reference not believed, no flag."""
@@ -21,12 +29,12 @@ def dive(k: int, letter: str, **changes) -> Assessment:
     return replace(made, **changes)
 
 
-def history(letters: str, rules: RuleParams | None = None) -> tuple[Watches, dict[str, Incident]]:
+def history(letters: str, rules: RuleParams | None = None) -> tuple[RuleStates, dict[str, Incident]]:
     """The state and the incidents, as last told, after dives given by their letters."""
-    state, incidents = Watches(), {}
+    state, incidents = RuleStates(), {}
     for k, letter in enumerate(letters):
         before = state
-        state, told = judge(state, dive(k, letter), rules or RuleParams())
+        state, told = advance(state, dive(k, letter), rules or RuleParams())
         incidents |= {i.id: i for i in told}
         for watch, earlier in ((state.anomaly, before.anomaly), (state.false_alarm, before.false_alarm)):
             assert (watch.phase == Phase.OPEN) == (watch.incident is not None)
@@ -100,11 +108,11 @@ def test_an_incident_is_named_by_its_first_dive():
 def test_the_worst_dive_is_the_one_furthest_out():
     state, _ = history("1")
     for k, speed in enumerate((0.20, 0.10, 0.30, 0.12), start=1):
-        state, (incident,) = judge(state, dive(k, "1", speed=speed), RuleParams())
+        state, (incident,) = advance(state, dive(k, "1", speed=speed), RuleParams())
     assert incident.worst.speed == 0.10 and incident.last.speed == 0.12
     state, _ = history("2")
     for k, p_e in enumerate((0.5, 0.9, 0.4), start=1):
-        state, (incident,) = judge(state, dive(k, "2", p_e=p_e), RuleParams())
+        state, (incident,) = advance(state, dive(k, "2", p_e=p_e), RuleParams())
     assert incident.worst.p_e == 0.9
 
 

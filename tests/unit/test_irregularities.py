@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from clocks import shifted
+from gliderwatch.incidents.irregularities import due, found
 from gliderwatch.model import Fix, Kind
-from gliderwatch.rules.irregularities import due, found
 from missions import START, Leg, feed, mission
 
 HOUR = 3600.0

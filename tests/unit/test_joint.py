@@ -4,12 +4,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gliderwatch.estimation import joint
-from gliderwatch.estimation.causes import Cause, Surprise, Surprises
-from gliderwatch.estimation.flow import FlowParams, mean_flow, noise, prior, transition
-from gliderwatch.estimation.joint import JointParams, step
-from gliderwatch.estimation.observation import observe
+from gliderwatch.estimation import kalman
+from gliderwatch.estimation.dive_measurement import observe
+from gliderwatch.estimation.kalman import JointParams, step
+from gliderwatch.estimation.modes import Cause, Surprise, Surprises
 from gliderwatch.model import Fix, readonly
+from gliderwatch.sea.gauss_markov import FlowParams, mean_flow, noise, prior, transition
 from joint_support import DAY, HOUR, LAT, LON, START, Way, dive, mission, wandering, ways
 
 PARAMS = JointParams()
@@ -85,8 +85,8 @@ def test_first_dive_gives_speed_and_flow():
 
 def test_filter_is_the_dense_solution(monkeypatch):
     """Without slip the model is linear: the filter must give what one great least-squares problem gives."""
-    monkeypatch.setattr(joint, "learn_sea", lambda factor, *_: factor)
-    monkeypatch.setattr(joint, "learn_doubt", lambda factor, *_: factor)
+    monkeypatch.setattr(kalman, "learn_process_scale", lambda factor, *_: factor)
+    monkeypatch.setattr(kalman, "learn_measurement_scale", lambda factor, *_: factor)
     never = Surprise(1e-300, 0.1)
     params = replace(
         QUIET,

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gliderwatch.errors import StateError
-from gliderwatch.run.life import Life, alive_path, is_held, silence
+from gliderwatch.service.liveness import PidLock, alive_path, is_held, seconds_silent
 
 
 @pytest.fixture
@@ -19,39 +19,39 @@ def state(tmp_path: Path) -> Path:
 
 def test_one_daemon_holds_a_state_file(state: Path) -> None:
     assert not is_held(state)
-    life = Life(state)
+    life = PidLock(state)
     assert is_held(state)
     with pytest.raises(StateError, match="another gliderwatch uses"):
-        Life(state)
+        PidLock(state)
     assert is_held(state)
     life.end()
     assert not is_held(state)
-    Life(state).end()
+    PidLock(state).end()
 
 
 def test_to_look_does_not_take_the_lock(state: Path) -> None:
-    Life(state).end()
+    PidLock(state).end()
     assert not is_held(state)
-    Life(state).end()
+    PidLock(state).end()
 
 
 def test_a_sign_of_life_is_seen(state: Path) -> None:
-    assert silence(state) is None
-    life = Life(state)
+    assert seconds_silent(state) is None
+    life = PidLock(state)
     os.utime(alive_path(state), (0, time.time() - 500))
-    assert silence(state) == pytest.approx(500, abs=60)
+    assert seconds_silent(state) == pytest.approx(500, abs=60)
     life.beat()
-    assert silence(state) == pytest.approx(0, abs=60)
+    assert seconds_silent(state) == pytest.approx(0, abs=60)
     life.end()
 
 
 def test_a_sign_of_life_of_the_future_is_no_negative_silence(state: Path) -> None:
-    Life(state).end()
+    PidLock(state).end()
     os.utime(alive_path(state), (0, time.time() + 500))
-    assert silence(state) == 0.0
+    assert seconds_silent(state) == 0.0
 
 
 def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(StateError, match=r"cannot be written: .* Choose another state.path"):
-        Life(tmp_path / "file" / "state.sqlite")
+        PidLock(tmp_path / "file" / "state.sqlite")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from alert_support import SLOW, alert
 from gliderwatch.model import Assessment
-from gliderwatch.run.lines import alert_line, assessment_line, iso, write_lines
+from gliderwatch.service.jsonl import alert_line, assessment_line, iso, write_lines
 
 PROMISED = {
     "glider",

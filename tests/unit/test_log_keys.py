@@ -12,11 +12,11 @@ import structlog
 import gliderwatch
 from acceptance.support import lacks_key
 from alert_support import alert
-from gliderwatch.alerts.outbox import OutboxRow, _about
+from gliderwatch.delivery.dispatcher import OutboxRow, _about
 from gliderwatch.model import Severity
-from gliderwatch.run import logs
-from gliderwatch.run.intake import Taken
-from gliderwatch.store.sqlite import File, Status
+from gliderwatch.service import logs
+from gliderwatch.service.transaction import FileOutcome
+from gliderwatch.store.state_file import File, Status
 
 LEVELS = {"debug", "info", "warning", "error", "critical", "exception"}
 KEYS = {"path", "paths", "glider", "gliders", "alert", "channel"}
@@ -68,7 +68,9 @@ def test_every_line_says_what_it_is_about_or_is_of_the_service_itself() -> None:
 def test_what_is_told_of_files_and_messages_has_their_keys() -> None:
     about, operator = alert("bruce/anomaly/1", glider="bruce"), alert("operator/disk/1", glider="")
     with structlog.testing.capture_logs() as lines:
-        logs.taken(Taken(File("/r/bruce/from-glider/a.sbd", 1, 1, Status.TAKEN, "bruce", "bruce-2024-1-0-0")))
+        logs.taken(
+            FileOutcome(File("/r/bruce/from-glider/a.sbd", 1, 1, Status.TAKEN, "bruce", "bruce-2024-1-0-0"))
+        )
         logs.alerts([about, operator])
         for each in (about, operator):
             logs.log.info("alert delivered", **_about(OutboxRow(1, each, "mail", 0)))

@@ -5,8 +5,7 @@ from __future__ import annotations
 import apprise
 import pytest
 
-from gliderwatch.alerts.mail import Envelope
-from gliderwatch.alerts.mailto import MailServer, mail_server
+from gliderwatch.delivery.mail import Envelope, MailServer, mail_server
 
 
 def read(url: str) -> MailServer:

@@ -15,24 +15,21 @@ from rich.console import Console
 
 from alert_support import DISAGREE, SLOW, alert, incident
 from announcing import Talk, World
-from gliderwatch import tables
+from gliderwatch.cli import manage, tables
+from gliderwatch.cli.incident_list import ack, incident_entries
+from gliderwatch.cli.status import as_json, overview
 from gliderwatch.config import Config, load
 from gliderwatch.errors import GliderwatchError, StateError
+from gliderwatch.incidents.acknowledgement import acknowledge, with_mute
+from gliderwatch.incidents.notifications import NotificationState, Thread, as_notified, due_notifications
+from gliderwatch.incidents.send_schedule import QuietHours, Wait
 from gliderwatch.model import Kind, Severity
 from gliderwatch.params import Attention
-from gliderwatch.rules.acknowledged import acknowledge
-from gliderwatch.rules.announce import Said, Thread, as_told, due
-from gliderwatch.rules.muting import with_mute
-from gliderwatch.rules.waiting import QuietHours, Wait
-from gliderwatch.run import intake
-from gliderwatch.run.manage import mute
-from gliderwatch.run.manage.incidents import ack, incidents
-from gliderwatch.run.posting import post_alerts
-from gliderwatch.run.speaking import NOBODY
-from gliderwatch.run.status import as_json, overview
-from gliderwatch.store import backup
+from gliderwatch.service import transaction
+from gliderwatch.service.routing import NOBODY, post_alerts
+from gliderwatch.store import maintenance
 from gliderwatch.store.database import MEMORY
-from gliderwatch.store.sqlite import Store
+from gliderwatch.store.state_file import Store
 from gliderwatch.store.watch_health import failing
 
 NOW = 1_700_000_000.0
@@ -77,7 +74,7 @@ class TestAcknowledged:
         (opened,) = World.of(letters[:3]).incidents()
         acks = {opened.id: acknowledge(opened, "ann", "", 0.0)} if taken_on else {}
         for known in [World.of(letters[:n]) for n in range(4, len(letters) + 1)] + [World.of(end)]:
-            talk.said, new = due(talk.said, known, talk.reminder_hours, False, acks)
+            talk.said, new = due_notifications(talk.said, known, talk.reminder_hours, False, acks)
             kinds += [str(a.kind) for a in new]
         return kinds
 
@@ -90,7 +87,7 @@ class TestAcknowledged:
         for n in range(6, len(letters) + 1):
             known = World.of("01" + letters[2:n])
             assert {i.id for i in known.incidents()}.isdisjoint(acks)
-            talk.said, new = due(talk.said, known, 24.0, False, acks)
+            talk.said, new = due_notifications(talk.said, known, 24.0, False, acks)
             assert "reminder" not in {str(a.kind) for a in new}
 
     @pytest.mark.parametrize(
@@ -121,7 +118,7 @@ class TestAcknowledged:
         first, is_new = ack(config, "electa/anomaly/1667639520", "ann", "on it", NOW)
         again, is_new_again = ack(config, "electa/anomaly/1667639520", "ann", "on it", NOW + 60)
         assert (is_new, is_new_again) == (True, False)
-        (kept,) = incidents(config)
+        (kept,) = incident_entries(config)
         assert kept == again == first
         assert kept.ack is not None
         assert (kept.ack.by, kept.ack.note, kept.ack.at) == ("ann", "on it", NOW)
@@ -130,20 +127,20 @@ class TestAcknowledged:
         ack(config, "electa/anomaly/1667639520", "ann", "", NOW)
         noted, is_new = ack(config, "electa/anomaly/1667639520", "bob", "mine now", NOW + 60)
         assert is_new
-        assert incidents(config) == [noted]
+        assert incident_entries(config) == [noted]
 
     @pytest.mark.parametrize("identity", ["electa/anomaly/7", "electa/anomaly/1", ""])
     def test_what_is_not_open_is_refused_with_what_is(self, config: Config, identity: str) -> None:
         with pytest.raises(GliderwatchError, match=r"open are:\n  electa/anomaly/1667639520$"):
             ack(config, identity, "ann", "", NOW)
-        assert [n.ack for n in incidents(config, every=True)] == [None, None]
+        assert [n.ack for n in incident_entries(config, every=True)] == [None, None]
 
 
 def test_incidents_of_one_glider_or_all_open_or_every(config: Config) -> None:
-    assert [n.incident.id for n in incidents(config)] == ["electa/anomaly/1667639520"]
-    assert next(n.incident.id for n in incidents(config, "Electa", every=True)) == "electa/anomaly/1"
+    assert [n.incident.id for n in incident_entries(config)] == ["electa/anomaly/1667639520"]
+    assert next(n.incident.id for n in incident_entries(config, "Electa", every=True)) == "electa/anomaly/1"
     with pytest.raises(GliderwatchError, match="there is no glider elekta; known are: electa"):
-        incidents(config, "elekta")
+        incident_entries(config, "elekta")
 
 
 class TestAsTold:
@@ -156,7 +153,7 @@ class TestAsTold:
         for n in range(1, len(before) + 1):
             talk.hear(before[:n])
             without.hear(before[:n])
-        talk.said = as_told(talk.said, World.of(after))
+        talk.said = as_notified(talk.said, World.of(after))
         return talk.hear(after), without.hear(after)
 
     @pytest.mark.parametrize(
@@ -197,7 +194,7 @@ class TestMute:
         ],
     )
     def test_ends_by_date_or_after_hours(self, date: str | None, hours: float | None, end: float) -> None:
-        assert mute.until(date, hours, NOW) == end
+        assert manage.end_of_mute(date, hours, NOW) == end
 
     @pytest.mark.parametrize(
         ("date", "hours", "told"),
@@ -216,7 +213,7 @@ class TestMute:
     )
     def test_other_ends_are_refused(self, date: str | None, hours: float | None, told: str) -> None:
         with pytest.raises(GliderwatchError, match=told):
-            mute.until(date, hours, NOW)
+            manage.end_of_mute(date, hours, NOW)
 
     @pytest.mark.parametrize(
         ("configured", "told", "counts"),
@@ -231,33 +228,33 @@ class TestMute:
         assert with_mute(Attention(), store.notes.muted_until("other")) == Attention()
 
     def test_puts_off_what_is_told_of_silence(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(intake.overdue, "next_tick", lambda *_: 100.0)
+        monkeypatch.setattr(transaction.overdue, "next_tick", lambda *_: 100.0)
         store = Store.open(MEMORY)
-        assert intake.next_tick(store, "electa", NOBODY, 0.0) == 100.0
+        assert transaction.next_tick(store, "electa", NOBODY, 0.0) == 100.0
         store.notes.mute("electa", 500.0, 0.0)
-        assert intake.next_tick(store, "electa", NOBODY, 0.0) == 500.0
+        assert transaction.next_tick(store, "electa", NOBODY, 0.0) == 500.0
         store.notes.unmute("electa", 50.0)
-        assert intake.next_tick(store, "electa", NOBODY, 0.0) == 100.0
+        assert transaction.next_tick(store, "electa", NOBODY, 0.0) == 100.0
 
     def test_is_taken_back(self, config: Config) -> None:
-        mute.mute(config, "ELECTA", NOW + 60, NOW)
-        assert mute.unmute(config, "electa", NOW) == ["electa: not muted any more"]
-        assert mute.unmute(config, "electa", NOW) == ["electa: was not muted"]
+        manage.mute_glider(config, "ELECTA", NOW + 60, NOW)
+        assert manage.unmute_glider(config, "electa", NOW) == ["electa: not muted any more"]
+        assert manage.unmute_glider(config, "electa", NOW) == ["electa: was not muted"]
 
     def test_is_only_of_gliders_that_are_known(self, config: Config) -> None:
         with pytest.raises(GliderwatchError, match=r"no glider elekta.*known are: electa"):
-            mute.mute(config, "elekta", NOW + 60, NOW)
+            manage.mute_glider(config, "elekta", NOW + 60, NOW)
 
     def test_what_the_configuration_mutes_no_command_undoes(self, config: Config, tmp_path: Path) -> None:
         path = tmp_path / "gliderwatch.yml"
         text = path.read_text(encoding="utf-8")
         path.write_text(text.replace("electa: ", "electa: {muted_until: 2023-12-01}"), encoding="utf-8")
         muted = load(path)
-        assert mute.mute(muted, "electa", NOW + 60, NOW)[1:] == [
+        assert manage.mute_glider(muted, "electa", NOW + 60, NOW)[1:] == [
             "muted_until of the configuration is later and counts: 2023-12-01 00:00 UTC"
         ]
         with pytest.raises(GliderwatchError, match=r"2023-12-01.*systemctl reload gliderwatch"):
-            mute.unmute(muted, "electa", NOW)
+            manage.unmute_glider(muted, "electa", NOW)
 
 
 class TestWaiting:
@@ -268,7 +265,7 @@ class TestWaiting:
         """An alert that the duty pilot got and that waits for the chief; a notice that waits for morning."""
         quiet = QuietHours(time(22), time(7), UTC, Severity.CRITICAL)
         waits = {"mail": [Wait()], "sms": [Wait(after=1800.0)]}
-        said = Said((Thread(incident().id, incident(), incident().last, 1, 0.0),))
+        said = NotificationState((Thread(incident().id, incident(), incident().last, 1, 0.0),))
         with closing(Store.open(Path(config.state.path))) as store:
             post_alerts(store, "electa", said, [alert()], lambda a: waits, NOW)
             notice = alert("n", incident="", audience=Severity.INFO)
@@ -284,7 +281,7 @@ class TestWaiting:
         assert self.waiting(config) == [("a1", "mail"), ("n", "post")]
 
     def test_so_does_a_mute(self, config: Config) -> None:
-        mute.mute(config, "electa", NOW + 3600, NOW + 60)
+        manage.mute_glider(config, "electa", NOW + 3600, NOW + 60)
         assert self.waiting(config) == [("a1", "mail"), ("n", "post")]
 
     def test_what_comes_after_it_is_for_who_was_told(self, config: Config) -> None:
@@ -299,7 +296,7 @@ class TestWaiting:
     def test_status_tells_what_is_held_and_that_it_is_no_trouble(
         self, config: Config, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("gliderwatch.run.status.time.time", lambda: NOW + 60)
+        monkeypatch.setattr("gliderwatch.cli.status.time.time", lambda: NOW + 60)
         view = overview(config)
         assert [u.channel for u in view.undelivered] == ["mail"]
         assert as_json(view)["held"] == [
@@ -332,7 +329,7 @@ class TestBackup:
         writer = Store.open(tmp_path / "state.sqlite")
         with writer.transaction():  # what is not committed is not in the copy, and holds nobody up
             writer.notes.mute("electa", 9.0, 0.0)
-            assert backup.backup(Path(config.state.path), target) == target.stat().st_size
+            assert maintenance.backup(Path(config.state.path), target) == target.stat().st_size
         writer.close()
         assert [p.name for p in target.parent.iterdir()] == ["copy.sqlite"]
         copy = Store.reading(target)
@@ -351,7 +348,7 @@ class TestBackup:
         else:
             target.symlink_to(tmp_path / "nowhere")
         with pytest.raises(GliderwatchError, match="is there already"):
-            backup.backup(Path(config.state.path), target)
+            maintenance.backup(Path(config.state.path), target)
         assert kind != "file" or target.read_text(encoding="utf-8") == "precious"
         assert not (tmp_path / "nowhere").exists()
 
@@ -359,9 +356,11 @@ class TestBackup:
         self, config: Config, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         target = tmp_path / "copy"
-        monkeypatch.setattr(backup, "_sync", lambda path: target.write_text("precious", encoding="utf-8"))
+        monkeypatch.setattr(
+            maintenance, "_sync", lambda path: target.write_text("precious", encoding="utf-8")
+        )
         with pytest.raises(GliderwatchError, match="is there now"):
-            backup.backup(Path(config.state.path), target)
+            maintenance.backup(Path(config.state.path), target)
         assert target.read_text(encoding="utf-8") == "precious"
         assert not (tmp_path / "copy.part").exists()
 
@@ -375,12 +374,12 @@ class TestBackup:
         data[(root - 1) * size : root * size] = os.urandom(size)
         state.write_bytes(data)
         with pytest.raises(StateError, match=r"not whole.*set.* aside"):
-            backup.backup(Path(config.state.path), tmp_path / "copy")
+            maintenance.backup(Path(config.state.path), tmp_path / "copy")
         assert not list(tmp_path.glob("copy*"))
 
     def test_into_a_folder_that_is_not_there_is_refused(self, config: Config, tmp_path: Path) -> None:
         with pytest.raises(GliderwatchError, match=r"No such file or directory\. Name another place"):
-            backup.backup(Path(config.state.path), tmp_path / "nowhere" / "copy")
+            maintenance.backup(Path(config.state.path), tmp_path / "nowhere" / "copy")
 
 
 def test_a_state_of_an_earlier_release_is_read_but_not_written(config: Config, tmp_path: Path) -> None:
@@ -396,8 +395,8 @@ def test_a_state_of_an_earlier_release_is_read_but_not_written(config: Config, t
         )
     assert [u.held_until for u in overview(config).undelivered] == [0.0]
     assert failing(path, NOW) == {}
-    assert [n.ack for n in incidents(config)] == [None]
+    assert [n.ack for n in incident_entries(config)] == [None]
     with pytest.raises(StateError, match="systemctl restart gliderwatch"):
-        mute.mute(config, "electa", NOW + 60, NOW)
+        manage.mute_glider(config, "electa", NOW + 60, NOW)
     Store.open(path).close()
-    assert mute.mute(config, "electa", NOW + 60, NOW) == ["electa: muted until 2023-11-14 22:14 UTC"]
+    assert manage.mute_glider(config, "electa", NOW + 60, NOW) == ["electa: muted until 2023-11-14 22:14 UTC"]

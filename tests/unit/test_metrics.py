@@ -19,21 +19,21 @@ import pytest
 from ruamel.yaml import YAML
 
 from alert_support import SLOW, alert
-from gliderwatch.config import Config, load, service
+from gliderwatch.config import Config, load, schema
 from gliderwatch.errors import ConfigError
 from gliderwatch.model import Hindrance, SegmentId, Severity
-from gliderwatch.run import heartbeat
-from gliderwatch.run.heartbeat import DECODING, STALLED, Decoding, Heartbeat, Upkeep
-from gliderwatch.run.life import STALE
-from gliderwatch.run.metrics import Metrics, Outbox
-from gliderwatch.run.operator import HOUR, Operator, Vitals, channels, troubles
+from gliderwatch.service import heartbeat
+from gliderwatch.service.heartbeat import DECODING, STALLED, Decoding, Heartbeat, Upkeep
+from gliderwatch.service.liveness import STALE
+from gliderwatch.service.metrics import Metrics, Outbox
+from gliderwatch.service.operator_alerts import HOUR, Operator, Vitals, channels, troubles
 from gliderwatch.store import outbox
-from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.store.state_file import File, Status, Store
 from gliderwatch.store.watch_health import Failing, Waiting
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 NOW = 1_800_000_000.0
-LIMITS = service.Operator()
+LIMITS = schema.Operator()
 
 
 @pytest.fixture
@@ -175,13 +175,13 @@ def test_it_listens_where_it_is_told_and_stops_when_told(state: Path) -> None:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     metrics = Metrics(state, config(state))
-    metrics.serve(service.Metrics())
+    metrics.serve(schema.Metrics())
     assert not metrics.is_served()
-    metrics.serve(service.Metrics(port=port))
+    metrics.serve(schema.Metrics(port=port))
     with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=10) as answer:
         text = answer.read().decode()
     assert re.search(r'gliderwatch_build_info\{.*version="', text)
-    metrics.serve(service.Metrics())
+    metrics.serve(schema.Metrics())
     assert not metrics.is_served()
     with pytest.raises(OSError, match="refused"), socket.create_connection(("127.0.0.1", port), timeout=10):
         pass
@@ -192,7 +192,7 @@ def test_a_port_that_is_taken_ends_nothing_and_is_tried_again(state: Path) -> No
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
         other.listen()
-        settings = service.Metrics(port=other.getsockname()[1])
+        settings = schema.Metrics(port=other.getsockname()[1])
         metrics.serve(settings)
         assert not metrics.is_served()
     metrics.serve(settings)
@@ -252,8 +252,8 @@ def test_each_trouble_is_told_beyond_its_limit_and_never_where_the_limit_is_null
     vitals: Vitals, key: str
 ) -> None:
     assert list(troubles(vitals, LIMITS, (), NOW)) == [key]
-    off = dict.fromkeys(service.Operator.model_fields)
-    assert troubles(vitals, service.Operator(**off), (), NOW) == {}
+    off = dict.fromkeys(schema.Operator.model_fields)
+    assert troubles(vitals, schema.Operator(**off), (), NOW) == {}
 
 
 def test_within_the_limits_nothing_is_told() -> None:

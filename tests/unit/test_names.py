@@ -1,6 +1,6 @@
 import pytest
 
-from gliderwatch.ingest import names
+from gliderwatch.slocum import folders
 
 
 @pytest.mark.parametrize(
@@ -31,24 +31,24 @@ from gliderwatch.ingest import names
     ],
 )
 def test_kind_of_flight_data_in_either_case(name, kind):
-    assert names.kind(name) == kind
+    assert folders.kind(name) == kind
 
 
 @pytest.mark.parametrize("name", ["8bc72b32.cac", "8BC72B32.CAC", "8bc72b32.ccc", "8bc72b32.Ccc"])
 def test_cache_names(name):
-    assert names.is_cache(name)
-    assert not names.is_cache(name + "x")
+    assert folders.is_cache(name)
+    assert not folders.is_cache(name + "x")
 
 
 @pytest.mark.parametrize("name", [".8bc72b32.cac", "8bc72b32.tmp.cac", "8bc72b32.cac~"])
 def test_a_cache_file_under_way_is_none(name):
-    assert not names.is_cache(name)
+    assert not folders.is_cache(name)
 
 
 def test_fuller_kinds_rank_higher():
-    assert names.rank("sbd") < names.rank("mbd") < names.rank("dbd")
+    assert folders.rank("sbd") < folders.rank("mbd") < folders.rank("dbd")
     with pytest.raises(KeyError):
-        names.rank("tbd")
+        folders.rank("tbd")
 
 
 @pytest.mark.parametrize(
@@ -69,11 +69,11 @@ def test_fuller_kinds_rank_higher():
     ],
 )
 def test_the_glider_in_a_full_name(full_name, glider):
-    assert names.glider_of(full_name) == glider
+    assert folders.glider_of(full_name) == glider
 
 
 def test_a_long_name_is_told_from_an_8x3_name():
-    assert names.is_long("usf-sam-2019-251-4-12.sbd")
-    assert names.is_long("usf-sam-2019-251-4-12.SCD")
-    assert not names.is_long("02000000.sbd")
-    assert not names.is_long("usf-sam-2019-251-4-12.sbd.tmp.sbd")
+    assert folders.is_long("usf-sam-2019-251-4-12.sbd")
+    assert folders.is_long("usf-sam-2019-251-4-12.SCD")
+    assert not folders.is_long("02000000.sbd")
+    assert not folders.is_long("usf-sam-2019-251-4-12.sbd.tmp.sbd")

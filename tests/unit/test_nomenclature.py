@@ -10,28 +10,21 @@ from pathlib import Path
 
 import pytest
 
-from gliderwatch.estimation import baseline
-from gliderwatch.estimation.adaptive import AdaptiveParams
-from gliderwatch.estimation.causes import Surprise, Surprises
-from gliderwatch.estimation.flow import FlowParams, Tide
-from gliderwatch.estimation.joint import JointParams
-from gliderwatch.estimation.range import RangeParams
-from gliderwatch.estimation.speed import SpeedParams
-from gliderwatch.ingest.decode import decode
-from gliderwatch.ingest.segment import QUANTITIES
-from gliderwatch.model import Assessment, Expected
-from gliderwatch.params import (
-    AnomalyRule,
-    Attention,
-    FalseAlarmRule,
-    GliderParams,
-    LearnerParams,
-    RuleParams,
-)
+from gliderwatch.estimation import healthy_baseline
+from gliderwatch.estimation.kalman import JointParams
+from gliderwatch.estimation.modes import Surprise, Surprises
+from gliderwatch.estimation.speed_range import RangeParams
+from gliderwatch.estimation.verdict import SpeedParams
+from gliderwatch.model import Assessment, NextSurfacing
+from gliderwatch.papers.learner import AdaptiveParams
+from gliderwatch.params import AnomalyRule, Attention, FalseAlarmRule, GliderParams, LearnerParams, RuleParams
 from gliderwatch.pipeline import GliderState, process
-from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.sea.gauss_markov import FlowParams, Tide
+from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
+from gliderwatch.slocum.decode import decode
+from gliderwatch.slocum.sensors import QUANTITIES
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "nomenclature.md"
@@ -80,7 +73,7 @@ def test_fields_of_an_assessment() -> None:
 
 
 def test_fields_of_the_next_surfacing() -> None:
-    assert named("Next surfacing") == [field.name for field in fields(Expected)]
+    assert named("Next surfacing") == [field.name for field in fields(NextSurfacing)]
 
 
 def test_parameters() -> None:
@@ -153,7 +146,7 @@ def with_usual() -> list[str]:
 
 
 def test_keys_with_what_is_usual() -> None:
-    assert with_usual() == [quantity.name for quantity in baseline.QUANTITIES]
+    assert with_usual() == [quantity.name for quantity in healthy_baseline.QUANTITIES]
 
 
 @pytest.mark.parametrize("estimator", ["joint", "adaptive"])

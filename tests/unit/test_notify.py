@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gliderwatch.run import notify
+from gliderwatch.service import liveness
 
 
 @pytest.fixture(params=["path", "abstract"])
@@ -26,12 +26,12 @@ def manager(
 
 
 def test_lines_are_one_message(manager: socket.socket) -> None:
-    notify.notify("READY=1", "STATUS=watching")
+    liveness.notify("READY=1", "STATUS=watching")
     assert manager.recv(100) == b"READY=1\nSTATUS=watching"
 
 
 def test_a_reload_has_a_time(manager: socket.socket) -> None:
-    notify.reloading()
+    liveness.reloading()
     first, second = manager.recv(100).decode().splitlines()
     assert first == "RELOADING=1"
     assert int(second.removeprefix("MONOTONIC_USEC=")) > 0
@@ -42,7 +42,7 @@ def test_without_a_manager_nothing_happens(monkeypatch: pytest.MonkeyPatch, addr
     monkeypatch.delenv("NOTIFY_SOCKET", raising=False)
     if address is not None:
         monkeypatch.setenv("NOTIFY_SOCKET", address)
-    notify.notify("READY=1")
+    liveness.notify("READY=1")
 
 
 @pytest.mark.parametrize(
@@ -63,4 +63,4 @@ def test_the_watchdog_is_served_twice_as_often_as_asked(
         monkeypatch.delenv(name, raising=False)
         if value is not None:
             monkeypatch.setenv(name, str(os.getpid()) if value == "own" else value)
-    assert notify.watchdog_seconds() == seconds
+    assert liveness.watchdog_seconds() == seconds

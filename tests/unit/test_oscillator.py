@@ -5,7 +5,7 @@ from decimal import Decimal, localcontext
 import numpy as np
 import pytest
 
-from gliderwatch.estimation.oscillator import response
+from gliderwatch.papers.learner import response
 
 
 def exact(k, b, h):

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from gliderwatch.errors import StateError
-from gliderwatch.store import damage
+from gliderwatch.store import maintenance
 from gliderwatch.store.database import connect, read_only, refuse_foreign
 from gliderwatch.store.ownership import APPLICATION_ID
-from gliderwatch.store.sqlite import Store
+from gliderwatch.store.state_file import Store
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "schema-1.sqlite.gz"
 
@@ -53,7 +53,7 @@ FOREIGN = {
 def test_a_file_of_another_program_is_refused_and_left_as_it_is(path: Path, kind: str) -> None:
     FOREIGN[kind](path)
     before = {p.name: p.read_bytes() for p in path.parent.iterdir()}
-    for attempt in (refuse_foreign, connect, read_only, lambda p: damage.set_aside(p, 0.0)):
+    for attempt in (refuse_foreign, connect, read_only, lambda p: maintenance.set_aside(p, 0.0)):
         with pytest.raises(StateError, match=r"is not gliderwatch's: it is .* left alone"):
             attempt(path)
     assert {p.name: p.read_bytes() for p in path.parent.iterdir()} == before
@@ -119,10 +119,10 @@ def test_our_own_damaged_file_is_ours(path: Path, harm: str, is_old: bool) -> No
     else:
         Store.open(path).close()
     path.write_bytes(HARM[harm](path.read_bytes()))
-    assert damage.damage(path)
+    assert maintenance.damage(path)
     if is_old and harm == "the first page is noise":  # nothing is left that would tell
         with pytest.raises(StateError, match="move this one away"):
-            damage.set_aside(path, 0.0)
+            maintenance.set_aside(path, 0.0)
         return
     refuse_foreign(path)
-    assert damage.set_aside(path, 0.0).exists()
+    assert maintenance.set_aside(path, 0.0).exists()

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gliderwatch.ingest.decode import decode
 from gliderwatch.model import Series, readonly
 from gliderwatch.navigation.pressure import LEAST, zeroed
 from gliderwatch.navigation.samples import prepare
-from gliderwatch.simulate.dockserver import write_mission
+from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
+from gliderwatch.slocum.decode import decode
 from missions import Leg, feed, mission, segment
 
 LEGS = [Leg(hours=2.0, heading=1.0 + 0.05 * (k % 3)) for k in range(12)]

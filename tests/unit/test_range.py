@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from gliderwatch.estimation.causes import FASTEST
-from gliderwatch.estimation.range import Normal, RangeParams, learn, setting, speed_range
+from gliderwatch.estimation.modes import FASTEST
+from gliderwatch.estimation.speed_range import Normal, RangeParams, learn, setting, speed_range
 from gliderwatch.model import DiveFeatures, readonly
 
 PARAMS = RangeParams()

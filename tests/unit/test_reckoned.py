@@ -6,9 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gliderwatch.estimation.causes import Cause
-from gliderwatch.estimation.reckoned import FEW, KEPT, Ratios, Reckoned, learn, reckon, vertical
-from gliderwatch.estimation.speed import SpeedParams, SpeedState, step
+from gliderwatch.estimation.kinematic_speed import (
+    FEW,
+    KEPT,
+    KinematicSpeed,
+    Ratios,
+    kinematic_speed,
+    learn,
+    vertical,
+)
+from gliderwatch.estimation.modes import Cause
+from gliderwatch.estimation.verdict import SpeedParams, SpeedState, step
 from gliderwatch.model import DiveFeatures, Flag, readonly
 from joint_support import HOUR, Way, mission, ways
 
@@ -91,25 +99,25 @@ def test_ways_down_and_up_count_by_the_time_that_they_take():
 def test_no_vertical_speed_where_a_part_of_it_is_missing(change):
     features = DiveFeatures(**{**told(0.25), **change})
     assert vertical(features) is None
-    assert reckon(Ratios(), features) is None
+    assert kinematic_speed(Ratios(), features) is None
 
 
 def test_ratio_is_a_guess_until_three_dives_tell():
     known, features = Ratios(), DiveFeatures(**told(0.25, ratio=1.3))
     for k in range(FEW):
-        found = reckon(known, features)
+        found = kinematic_speed(known, features)
         assert found.speed == pytest.approx(0.25 * 1.3 / 1.17), k
         assert found.sigma == pytest.approx(0.15 * found.speed)
         known = learn(known, features, 0.25)
-    found = reckon(known, features)
-    assert found == Reckoned(pytest.approx(0.25), pytest.approx(0.07 * 0.25), 0.01, is_prompt=True)
+    found = kinematic_speed(known, features)
+    assert found == KinematicSpeed(pytest.approx(0.25), pytest.approx(0.07 * 0.25), 0.01, is_prompt=True)
 
 
 def test_scatter_of_the_ratios_is_their_uncertainty():
     known = Ratios()
     for ratio in (0.9, 1.0, 1.1, 1.3, 1.2):
         known = learn(known, telling_dive(0.25, ratio=ratio), 0.25)
-    found = reckon(known, telling_dive(0.25, ratio=1.1))
+    found = kinematic_speed(known, telling_dive(0.25, ratio=1.1))
     assert found.speed == pytest.approx(0.25)
     assert found.sigma == pytest.approx(1.4826 * 0.1 * 0.25, rel=0.1)
 
@@ -119,37 +127,37 @@ def test_only_the_last_dives_count():
     for k in range(2 * KEPT):
         known = learn(known, telling_dive(0.25, ratio=1.0 if k < KEPT else 1.3), 0.25)
     assert len(known.vertical) == KEPT
-    assert reckon(known, telling_dive(0.25, ratio=1.3)).speed == pytest.approx(0.25)
+    assert kinematic_speed(known, telling_dive(0.25, ratio=1.3)).speed == pytest.approx(0.25)
 
 
 def test_mean_of_the_glider_is_not_used_before_three_healthy_dives():
     known, features = Ratios(), DiveFeatures(**told(0.0, onboard=0.26))
     for _ in range(FEW):
-        assert reckon(known, features) is None
+        assert kinematic_speed(known, features) is None
         known = learn(known, features, 0.25)
-    found = reckon(known, features)
-    assert found == Reckoned(pytest.approx(0.25), pytest.approx(0.12 * 0.25), 0.1, is_prompt=False)
+    found = kinematic_speed(known, features)
+    assert found == KinematicSpeed(pytest.approx(0.25), pytest.approx(0.12 * 0.25), 0.1, is_prompt=False)
 
 
 def test_vertical_speed_comes_first():
     known = Ratios((1.0,) * FEW, (1.0,) * FEW)
-    assert reckon(known, replace(telling_dive(0.25, ratio=1.0), onboard_speed=0.4)).speed == pytest.approx(
-        0.25
-    )
-    assert reckon(known, telling_dive(0.0, onboard=0.4)).speed == pytest.approx(0.4)
+    assert kinematic_speed(
+        known, replace(telling_dive(0.25, ratio=1.0), onboard_speed=0.4)
+    ).speed == pytest.approx(0.25)
+    assert kinematic_speed(known, telling_dive(0.0, onboard=0.4)).speed == pytest.approx(0.4)
 
 
 @pytest.mark.parametrize("speed", [0.0, -0.2])
 def test_speed_that_cannot_be_tells_nothing_and_teaches_nothing(speed):
     features = DiveFeatures(**told(0.0, onboard=speed))
-    assert reckon(Ratios(onboard=(1.0,) * FEW), features) is None
+    assert kinematic_speed(Ratios(onboard=(1.0,) * FEW), features) is None
     assert learn(Ratios(), features, 0.25) == Ratios()
 
 
 def test_short_dive_tells_nothing_and_teaches_nothing():
     """Its turns and the surface take too much of the time."""
     short = replace(telling_dive(0.25), duration=0.9 * HOUR)
-    assert reckon(Ratios(), short) is None
+    assert kinematic_speed(Ratios(), short) is None
     assert learn(Ratios(), short, 0.25) == Ratios()
 
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from euler import euler_step
-from gliderwatch.detection.flags import FlowMaxima, flag, p_e, update
-from gliderwatch.estimation.adaptive import AdaptiveParams, AdaptiveState, advance, init
-from gliderwatch.estimation.basis import Basis, phi
 from gliderwatch.model import Flag, readonly
+from gliderwatch.papers.basis import Basis, phi
+from gliderwatch.papers.flags import FlowMaxima, flag, p_e, update
+from gliderwatch.papers.learner import AdaptiveParams, AdaptiveState, advance, init
 
 THETA = np.array([[0.9, 0.5, 0.7], [0.8, 0.5, 0.9]])
 CENTRES = readonly([[0, 0], [10, 10], [5, 5]])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gliderwatch.model import Series, readonly
-from gliderwatch.navigation.samples import SPACING, after, compact, concatenated, get, joined, prepare
+from gliderwatch.navigation.samples import SPACING, after, concatenated, downsample, get, joined, prepare
 from missions import segment, series
 
 
@@ -13,7 +13,7 @@ def dense(name: str, values, step: float = 4.0) -> dict[str, Series]:
 
 
 def test_fine_samples_are_averaged_in_bins():
-    out = compact(dense("pitch", np.arange(60.0)))["pitch"]
+    out = downsample(dense("pitch", np.arange(60.0)))["pitch"]
     assert np.diff(out.t).max() < 1.2 * SPACING
     assert out.v[0] == pytest.approx(np.mean(np.arange(8.0)))  # 0 to 28 s
     assert out.v.mean() == pytest.approx(29.5, abs=1.0)
@@ -21,23 +21,23 @@ def test_fine_samples_are_averaged_in_bins():
 
 def test_coarse_samples_stay_as_they_are():
     coarse = dense("pitch", np.arange(10.0), step=SPACING)
-    assert compact(coarse)["pitch"] is coarse["pitch"]
+    assert downsample(coarse)["pitch"] is coarse["pitch"]
 
 
 def test_headings_around_north_average_to_north():
-    out = compact(dense("heading", np.radians([350.0, 10.0, 355.0, 5.0])))["heading"]
+    out = downsample(dense("heading", np.radians([350.0, 10.0, 355.0, 5.0])))["heading"]
     assert np.sin(out.v[0]) == pytest.approx(0.0, abs=1e-12) and np.cos(out.v[0]) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("name", ["fix_lat", "current_x", "current_final_y"])
 def test_every_fix_and_current_counts(name):
     whole = dense(name, np.arange(60.0))
-    assert compact(whole)[name] is whole[name]
+    assert downsample(whole)[name] is whole[name]
 
 
 @pytest.mark.parametrize("name", ["dr_lat", "dr_time", "waypoint_lon"])
 def test_what_jumps_is_never_averaged(name):
-    out = compact(dense(name, [36.0] * 5 + [37.0] * 25))[name]
+    out = downsample(dense(name, [36.0] * 5 + [37.0] * 25))[name]
     assert set(out.v.tolist()) == {36.0, 37.0}
 
 
@@ -45,8 +45,8 @@ def test_thinning_twice_changes_nothing():
     rng = np.random.default_rng(3)
     t = readonly(np.sort(rng.uniform(0, 3e4, 3000)))
     names = ("pitch", "heading", "depth", "dr_lat", "fix_lat", "current_x")
-    once = compact({name: Series(t, readonly(rng.uniform(0, 6, 3000))) for name in names})
-    twice = compact(once)
+    once = downsample({name: Series(t, readonly(rng.uniform(0, 6, 3000))) for name in names})
+    twice = downsample(once)
     assert all(twice[name] is once[name] for name in names)
 
 
@@ -57,7 +57,7 @@ def test_four_seconds_cadence_and_thinned_data_lead_to_the_same():
     held = {n: list(zip(t, rng.uniform(0, 3, len(t)), strict=True)) for n in ("heading", "pitch", "depth")}
     whole = segment("a", 0.0, held)
     thin = segment(
-        "a", 0.0, {k: list(zip(s.t, s.v, strict=True)) for k, s in compact(whole.quantities).items()}
+        "a", 0.0, {k: list(zip(s.t, s.v, strict=True)) for k, s in downsample(whole.quantities).items()}
     )
     one, other = prepare(whole, 0.1), prepare(thin, 0.1)
     assert {k: s.v.tolist() for k, s in one.items()} == {k: s.v.tolist() for k, s in other.items()}

@@ -7,10 +7,9 @@ import pytest
 
 from gliderwatch.errors import ConfigError, GliderwatchError
 from gliderwatch.score import work
-from gliderwatch.score.estimators import check, configuration, known
-from gliderwatch.score.grid import cells, folder, load_grid
-from gliderwatch.score.pool import to_do
-from gliderwatch.simulate.faults import FaultKind
+from gliderwatch.score.grid import cells, check, configuration, folder, known, load_grid
+from gliderwatch.score.work import to_do
+from gliderwatch.simulate.scenario import FaultKind
 
 SMALL = load_grid("small")
 

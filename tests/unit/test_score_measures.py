@@ -8,18 +8,20 @@ import pytest
 
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.params import RuleParams
-from gliderwatch.score import plots, roc
+from gliderwatch.score import plots, summary
+from gliderwatch.score.accuracy import speed_scores
 from gliderwatch.score.measures import (
     MONTH,
     Detection,
+    DiveResult,
+    OpenedIncident,
+    Record,
     bootstrap,
     detection,
     false_scores,
     fault_scores,
     quantile,
 )
-from gliderwatch.score.record import DiveResult, Record, Told
-from gliderwatch.score.speeds import speed_scores
 from gliderwatch.score.summary import summarise, tables, write
 
 HOUR = 3600.0
@@ -55,7 +57,7 @@ def glider(
 
 
 def told(flag, hours, late=0.1):
-    return Told(flag, hours * HOUR, (hours + late) * HOUR)
+    return OpenedIncident(flag, hours * HOUR, (hours + late) * HOUR)
 
 
 def test_the_delay_counts_from_the_onset_to_the_file_that_told():
@@ -143,14 +145,14 @@ def test_bootstrap_is_the_same_each_time_and_as_wide_as_gliders_differ():
 
 def test_other_bounds_are_judged_by_the_same_rules():
     speeds = (0.25,) * 40 + (0.20,) * 40
-    assert roc.judged(glider(speeds=speeds), 0.7, RuleParams()).told == ()
-    (opened,) = roc.judged(glider(speeds=speeds), 0.9, RuleParams()).told
+    assert summary.judged(glider(speeds=speeds), 0.7, RuleParams()).told == ()
+    (opened,) = summary.judged(glider(speeds=speeds), 0.9, RuleParams()).told
     assert (opened.flag, opened.t_surface) == (1, 122.5 * HOUR + 3 * HOUR)  # two dives in a row
 
 
 def test_the_curve_rises_with_the_bound():
     speeds = (0.25,) * 40 + (0.20,) * 40
-    found = {p.lower: p for p in roc.points([glider(speeds=speeds), glider("none", seed=1)])}
+    found = {p.lower: p for p in summary.points([glider(speeds=speeds), glider("none", seed=1)])}
     assert (found[0.7].detected, found[0.9].detected) == (0.0, 1.0)
     assert found[0.9].false == 0.0
 
@@ -164,7 +166,7 @@ def test_a_summary_is_written_and_shown(tmp_path):
 
 
 def test_faults_are_shown_with_a_column_for_each_sea():
-    told = glider(told=[Told(1, ONSET + 2 * HOUR, ONSET + 3 * HOUR)], sea="rotary")
+    told = glider(told=[OpenedIncident(1, ONSET + 2 * HOUR, ONSET + 3 * HOUR)], sea="rotary")
     seas = [replace(told, sea=name) for name in ("mixed", "shallow", "deep", "slack", "front")]
     by_sea = [t for t in tables(summarise([told, glider(), *seas], "v")) if "detected of" in str(t.title)]
     names = [str(column.header) for table in by_sea for column in table.columns]

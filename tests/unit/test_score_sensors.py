@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from gliderwatch.ingest.segment import QUANTITIES, model_declination
 from gliderwatch.navigation.dives import Navigation, extend
 from gliderwatch.score.sensors import LEFT_OUT, cadence_without, is_sent, left_out
-from gliderwatch.simulate.sensors import CADENCE
+from gliderwatch.simulate.telemetry import CADENCE
+from gliderwatch.slocum.sensors import QUANTITIES, model_declination
 from missions import Leg, mission
 
 SEGMENTS = mission([Leg(speed=0.3, heading=1.0, current=(0.1, -0.05))] * 4)

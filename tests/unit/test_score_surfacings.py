@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from alert_support import HEALTHY
-from gliderwatch.model import Assessment, Expected
-from gliderwatch.navigation.frame import from_plane
-from gliderwatch.score.surfacings import next_scores, results
+from gliderwatch.model import Assessment, NextSurfacing
+from gliderwatch.navigation.geodesy import from_plane
+from gliderwatch.score.accuracy import next_scores, results
 from unit.test_score_measures import glider
 
 HOUR = 3600.0
@@ -27,10 +27,10 @@ def fix(k: int) -> float:
     return k * 3 * HOUR + 2.8 * HOUR + 120.0
 
 
-def said(k: int, east: float, late: float = 0.0, sigma: float = 300.0) -> Expected:
+def said(k: int, east: float, late: float = 0.0, sigma: float = 300.0) -> NextSurfacing:
     """What was said after the ``k``-th dive: the next fix is ``east`` of the start (m)."""
     lat, lon = from_plane(np.array([east, 0.0]), LAT, LON)
-    return Expected(fix(k), fix(k + 1) - late, 600.0, lat, lon, sigma**2, 0.0, sigma**2, "test")
+    return NextSurfacing(fix(k), fix(k + 1) - late, 600.0, lat, lon, sigma**2, 0.0, sigma**2, "test")
 
 
 DIVES = [dive(0, 0.0), dive(1, 1000.0), dive(2, 3000.0), dive(3, 3500.0)]

@@ -4,15 +4,9 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from gliderwatch.ingest.header import Header
-from gliderwatch.ingest.segment import (
-    QUANTITIES,
-    SENSORS,
-    build_segment,
-    depth_of,
-    model_declination,
-)
 from gliderwatch.model import SegmentId
+from gliderwatch.slocum.header import Header
+from gliderwatch.slocum.sensors import QUANTITIES, SENSORS, build_segment, depth_of, model_declination
 
 T0 = datetime(2022, 11, 7, tzinfo=UTC).timestamp()
 HEADER = Header(

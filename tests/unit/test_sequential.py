@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from gliderwatch.detection.sequential import (
+from gliderwatch.estimation.step_test import (
     WINDOW,
     Bank,
     Update,

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from gliderwatch.ingest.settle import Settling
+from gliderwatch.slocum.folders import Settling
 
 LONG = Path("/r/electa/from-glider/electa-2022-308-3-2.sbd")
 SHORT = Path("/r/electa/from-glider/00930002.sbd")

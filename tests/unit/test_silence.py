@@ -7,22 +7,22 @@ from math import hypot
 import pytest
 
 from alert_support import incident
-from gliderwatch.alerts.overdue import Fleet
-from gliderwatch.model import Severity
-from gliderwatch.navigation.frame import to_plane
-from gliderwatch.rules.silence import (
+from gliderwatch.incidents.overdue import (
     FRESH,
     GONE,
-    Awaited,
+    ExpectedCall,
     Sign,
-    awaited,
     drift,
+    expected_call,
     first_call,
     fleet,
     guess,
     is_at_sea,
     margin,
 )
+from gliderwatch.messages.overdue_text import Fleet
+from gliderwatch.model import Severity
+from gliderwatch.navigation.geodesy import to_plane
 from silent import CALL, DAY, HOUR, INTERVAL, MARGIN, T0, Clock, Sea, expected
 
 DUE = T0 + INTERVAL + MARGIN
@@ -68,26 +68,30 @@ class TestSignOfLife:
 
 class TestAwaited:
     def test_the_call_expected(self):
-        assert awaited(expected(), [], T0, None) == Awaited(T0, T0 + INTERVAL, DUE, INTERVAL)
+        assert expected_call(expected(), [], T0, None) == ExpectedCall(T0, T0 + INTERVAL, DUE, INTERVAL)
 
     def test_the_end_of_the_last_call_does_not_put_the_next_off(self):
-        call = awaited(expected(), [Sign(T0 - INTERVAL, T0 + CALL, T0 + CALL)], DUE, None)
+        call = expected_call(expected(), [Sign(T0 - INTERVAL, T0 + CALL, T0 + CALL)], DUE, None)
         assert (call.heard, call.due) == (T0 + CALL, DUE)
 
     def test_a_file_that_waits_for_its_cache_does(self):
-        call = awaited(expected(), [Sign(T0 + CALL, None, DUE - 1)], DUE, None)
+        call = expected_call(expected(), [Sign(T0 + CALL, None, DUE - 1)], DUE, None)
         assert call.heard == T0 + CALL + INTERVAL and call.due == DUE + CALL + INTERVAL
 
     def test_a_file_of_later_is_not_known_yet(self):
-        call = awaited(expected(), [Sign(T0 + 4 * HOUR, T0 + 7 * HOUR, T0 + 7 * HOUR)], T0 + 5 * HOUR, None)
+        call = expected_call(
+            expected(), [Sign(T0 + 4 * HOUR, T0 + 7 * HOUR, T0 + 7 * HOUR)], T0 + 5 * HOUR, None
+        )
         assert call.heard == T0
 
     def test_old_files_that_come_late_are_no_sign_of_life(self):
-        call = awaited(expected(), [Sign(T0 - 5 * DAY, None, DUE), Sign(T0 - DAY, T0 - DAY, DUE)], DUE, None)
+        call = expected_call(
+            expected(), [Sign(T0 - 5 * DAY, None, DUE), Sign(T0 - DAY, T0 - DAY, DUE)], DUE, None
+        )
         assert (call.heard, call.due) == (T0, DUE)
 
     def test_it_becomes_overdue_at_growing_intervals(self):
-        call = Awaited(T0, T0, T0 + 10, INTERVAL)
+        call = ExpectedCall(T0, T0, T0 + 10, INTERVAL)
         assert [call.stage(k) - T0 for k in range(4)] == [10, 20, 40, 80]
         assert [call.stages(T0 + s) for s in (9.9, 10, 19, 20, 79, 80)] == [0, 1, 1, 2, 3, 4]
 
@@ -129,7 +133,7 @@ class TestGuess:
 
 
 class TestFirstCall:
-    CALL = Awaited(T0 + CALL, T0 + INTERVAL, DUE, INTERVAL)
+    CALL = ExpectedCall(T0 + CALL, T0 + INTERVAL, DUE, INTERVAL)
 
     def test_none(self):
         assert first_call(self.CALL, [Sign(T0 - INTERVAL, T0, T0)], None, DUE) is None

@@ -8,12 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gliderwatch.simulate.delivery import Fate, FileForm, Names, arrivals, make_calls
-from gliderwatch.simulate.dockserver import Act, play, steps
-from gliderwatch.simulate.fleet import fleet
-from gliderwatch.simulate.glider import simulate
+from gliderwatch.simulate.delivery import Act, Fate, FileForm, Names, arrivals, make_calls, play, steps
+from gliderwatch.simulate.glider import fleet, simulate
 from gliderwatch.simulate.scenario import Fault, FaultKind, FixIn, Mission, Rates, Scenario
-from gliderwatch.simulate.sensors import CADENCE, SCIENCE_CADENCE
+from gliderwatch.simulate.telemetry import CADENCE, SCIENCE_CADENCE
 from simulated import degrees, samples
 
 PLAIN = Scenario(days=1.5, science=SCIENCE_CADENCE, surface_segments=True)

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gliderwatch.simulate.faults import SIZES, STRIKE, Health
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.ocean import Sea
-from gliderwatch.simulate.scenario import DiveTruth, Fault, FaultKind, Mission
+from gliderwatch.simulate.scenario import SIZES, STRIKE, DiveTruth, Fault, FaultKind, Health, Mission
 from simulated import DAY, ONSET, STRAIGHT, closures, medians, samples
 
 QUIET = replace(STRAIGHT, sea=Sea(residual=(0.06, 0.0), sigma=0.0, tides=()))

@@ -8,21 +8,20 @@ import numpy as np
 import pytest
 
 from gliderwatch.errors import ConfigError
-from gliderwatch.simulate import scenarios
+from gliderwatch.simulate import scenario_files
 from gliderwatch.simulate.dinkum import Generation
-from gliderwatch.simulate.faults import FaultKind
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.ocean import Constituent
-from gliderwatch.simulate.scenario import FixIn, Scenario
-from gliderwatch.simulate.sensors import CADENCE, SCIENCE_CADENCE
+from gliderwatch.simulate.scenario import FaultKind, FixIn, Scenario
+from gliderwatch.simulate.telemetry import CADENCE, SCIENCE_CADENCE
 
-SHIPPED = scenarios.shipped()
+SHIPPED = scenario_files.shipped()
 
 
 def load(text: str, folder: Path) -> Scenario:
     path = folder / "mine.yml"
     path.write_text(text, encoding="utf-8")
-    return scenarios.load(path)
+    return scenario_files.load_scenario(path)
 
 
 def complaint(text: str, folder: Path) -> str:
@@ -41,7 +40,7 @@ def test_there_is_a_scenario_for_each_sea_and_each_fault() -> None:
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_scenarios_are_read_and_say_what_they_are(name: str) -> None:
-    scenario = scenarios.load(scenarios.find(name))
+    scenario = scenario_files.load_scenario(scenario_files.find(name))
     about = re.search(r"^about: (.+)$", SHIPPED[name].read_text(), re.MULTILINE)
     assert about and len(about[1]) > 20
     assert scenario.science
@@ -51,12 +50,12 @@ def test_shipped_scenarios_are_read_and_say_what_they_are(name: str) -> None:
 
 
 def test_shipped_scenarios_have_seeds_of_their_own() -> None:
-    seeds = [scenarios.load(path).seed for path in SHIPPED.values()]
+    seeds = [scenario_files.load_scenario(path).seed for path in SHIPPED.values()]
     assert len(set(seeds)) == len(seeds)
 
 
 def test_the_gulf_stream_flows_faster_than_the_glider_flies() -> None:
-    mission = simulate(scenarios.load(scenarios.find("gulf_stream")))
+    mission = simulate(scenario_files.load_scenario(scenario_files.find("gulf_stream")))
     speeds = [dive.speed for dive in mission.truth]
     assert 0.5 < min(speeds) < max(speeds) < 0.7
     assert max(np.hypot(*dive.current) for dive in mission.truth) > 1.3 * max(speeds)
@@ -64,22 +63,22 @@ def test_the_gulf_stream_flows_faster_than_the_glider_flies() -> None:
 
 def test_a_missing_scenario_names_the_nearest() -> None:
     with pytest.raises(ConfigError, match=r"no scenario gulfstream.*did you mean `gulf_stream`"):
-        scenarios.find("gulfstream")
+        scenario_files.find("gulfstream")
 
 
 def test_a_scenario_may_be_a_file(tmp_path: Path) -> None:
     path = tmp_path / "mine.yml"
     path.write_text("days: 2\n")
-    assert scenarios.find(str(path)) == path
+    assert scenario_files.find(str(path)) == path
 
 
 def test_scenarios_are_found_in_a_wheel_and_in_a_checkout(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    assert scenarios.folder() == Path(__file__).parents[2] / "config" / "scenarios"
+    assert scenario_files.folder() == Path(__file__).parents[2] / "config" / "scenarios"
     (tmp_path / "scenarios").mkdir()
     monkeypatch.setattr("gliderwatch.config.__file__", str(tmp_path / "__init__.py"))
-    assert scenarios.folder() == tmp_path / "scenarios"
+    assert scenario_files.folder() == tmp_path / "scenarios"
     pyproject = (Path(__file__).parents[2] / "pyproject.toml").read_text()
     assert '"config/scenarios" = "gliderwatch/config/scenarios"' in pyproject
 
@@ -199,12 +198,12 @@ def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
 )
 def test_a_fault_in_short_that_is_none(text: str, said: str) -> None:
     with pytest.raises(ConfigError) as error:
-        scenarios.fault_line(text)
+        scenario_files.fault_line(text)
     assert said in str(error.value)
 
 
 def test_a_fault_in_short() -> None:
-    fault = scenarios.fault_line("compass:-0.3@2.5").fault(1000.0)
+    fault = scenario_files.fault_line("compass:-0.3@2.5").fault(1000.0)
     assert (fault.kind, fault.size, fault.onset, fault.ramp) == (
         FaultKind.COMPASS,
         -0.3,

@@ -10,8 +10,7 @@ from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.ocean import Constituent, Ellipse, Front, Ocean, Sea, make_ocean
 from gliderwatch.simulate.onboard import Point, offset
 from gliderwatch.simulate.scenario import Mission, Scenario
-from gliderwatch.simulate.sensors import SCIENCE_CADENCE
-from gliderwatch.simulate.telemetry import CADENCE
+from gliderwatch.simulate.telemetry import CADENCE, SCIENCE_CADENCE
 from gliderwatch.simulate.water import Bottom, Layer, Water
 from simulated import samples
 

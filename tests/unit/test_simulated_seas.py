@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gliderwatch.simulate.faults import Fault, FaultKind
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.ocean import Constituent
+from gliderwatch.simulate.scenario import Fault, FaultKind
 from gliderwatch.simulate.seas import SEAS, sea_mission, with_fault
 
 DAY = 86400.0

@@ -13,10 +13,10 @@ import pytest
 
 from alert_support import alert
 from gliderwatch.config import Config, load
+from gliderwatch.incidents.send_schedule import QuietHours, Wait
 from gliderwatch.model import Kind, Severity
-from gliderwatch.rules.waiting import QuietHours, Wait
-from gliderwatch.run import operator, replay
-from gliderwatch.run.speaking import NOBODY, channels, speaking
+from gliderwatch.service import operator_alerts, replay
+from gliderwatch.service.routing import NOBODY, channels, routing_of
 
 
 def config(folder: Path, **recipients: dict[str, Any]) -> Config:
@@ -81,7 +81,7 @@ def test_surfacing_notices_go_only_to_those_who_asked(tmp_path: Path) -> None:
     notice = {"kind": Kind.SURFACING, "audience": Severity.INFO}
     assert told(settings, **notice) == ["sms"]
     assert told(settings, **notice, glider="sam") == []
-    wanted = speaking(settings)
+    wanted = routing_of(settings)
     assert wanted.notices("electa")
     assert not wanted.notices("sam")
     assert list(wanted.channels(replace(alert(), kind=Kind.SURFACING, glider="electa"))) == ["sms"]
@@ -110,7 +110,7 @@ def test_each_channel_tells_what_those_who_share_it_wait_for(tmp_path: Path) -> 
     }
     notice = replace(alert(), kind=Kind.SURFACING, incident="")
     assert channels(notice, settings) == {"mail": [Wait()], "sms": [Wait()], "slack": [Wait()]}
-    assert operator.channels(settings, Severity.WARNING, "disk") == {
+    assert operator_alerts.channels(settings, Severity.WARNING, "disk") == {
         "mail": [Wait(), Wait(None, hours)],
         "sms": [Wait()],
         "slack": [Wait()],

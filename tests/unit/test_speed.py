@@ -4,8 +4,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gliderwatch.estimation.range import RangeParams
-from gliderwatch.estimation.speed import SpeedParams, SpeedState, step
+from gliderwatch.estimation.speed_range import RangeParams
+from gliderwatch.estimation.verdict import SpeedParams, SpeedState, step
 from gliderwatch.model import Fix, Flag, readonly
 from joint_support import DAY, HOUR, LAT, LON, START, Way, mission, ways
 

@@ -6,7 +6,7 @@ import pytest
 from gliderwatch.model import Current, Fix, Track
 from gliderwatch.navigation.features import evidence, track_features
 from gliderwatch.navigation.flight import Flight
-from gliderwatch.navigation.frame import from_plane, to_plane
+from gliderwatch.navigation.geodesy import from_plane, to_plane
 from gliderwatch.navigation.track import build_track, closure, mean_heading
 from missions import LAT, LON, series
 

@@ -12,14 +12,14 @@ import pytest
 import structlog
 
 from gliderwatch.errors import DamagedError, StateError
-from gliderwatch.run import trouble
-from gliderwatch.run.trouble import Trouble
-from gliderwatch.store.sqlite import Store
+from gliderwatch.service import state_outage
+from gliderwatch.service.state_outage import StateOutage
+from gliderwatch.store.state_file import Store
 
 
 @pytest.fixture
 def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Store:
-    monkeypatch.setattr(trouble, "PAUSE", 0.0)
+    monkeypatch.setattr(state_outage, "PAUSE", 0.0)
     return Store.open(tmp_path / "state.sqlite")
 
 
@@ -32,7 +32,7 @@ def test_no_turn_is_done_until_the_state_can_be_written_again(store: Store) -> N
         if len(turns) == 1:
             store.probe()
 
-    watch = Trouble(store, lambda: False)
+    watch = StateOutage(store, lambda: False)
     store._db.execute("PRAGMA query_only = 1")
     assert [watch.spared(turn) for _ in range(3)] == [False] * 3 and len(turns) == 1
     store._db.execute("PRAGMA query_only = 0")
@@ -44,11 +44,11 @@ def test_what_sqlite_says_outside_a_transaction_is_trouble_too(store: Store) -> 
     path = Path(store._path)
     path.write_bytes(b"")
     bare = Store(sqlite3.connect(path), path)
-    assert not Trouble(bare, lambda: False).spared(lambda: print(bare.counts()))
+    assert not StateOutage(bare, lambda: False).spared(lambda: print(bare.counts()))
 
 
 def test_damage_and_mistakes_are_not_waited_for(store: Store) -> None:
-    watch = Trouble(store, lambda: False)
+    watch = StateOutage(store, lambda: False)
     for error in (DamagedError("bad"), ZeroDivisionError()):
 
         def turn(error: Exception = error) -> None:
@@ -59,15 +59,15 @@ def test_damage_and_mistakes_are_not_waited_for(store: Store) -> None:
 
 
 def test_it_ends_at_once_when_it_is_told_to(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(trouble, "PAUSE", 1e6)
+    monkeypatch.setattr(state_outage, "PAUSE", 1e6)
 
     def turn() -> None:
         raise StateError("full")
 
-    assert not Trouble(store, lambda: True).spared(turn)
+    assert not StateOutage(store, lambda: True).spared(turn)
 
 
-def events(watch: Trouble, turn: Callable[[], None], turns: int) -> list[str]:
+def events(watch: StateOutage, turn: Callable[[], None], turns: int) -> list[str]:
     with structlog.testing.capture_logs() as log:
         for _ in range(turns):
             watch.spared(turn)
@@ -85,7 +85,7 @@ def test_while_no_room_is_made_it_is_said_once(store: Store) -> None:
         if not room:
             raise StateError("full")
 
-    watch = Trouble(store, lambda: False)
+    watch = StateOutage(store, lambda: False)
     assert events(watch, turn, 5) == [SAID]
     room = True
     assert events(watch, turn, 2) == [OVER]
@@ -103,7 +103,7 @@ def test_a_turn_with_nothing_to_do_is_no_good_news_on_a_full_disk(
         if (error := next(outcomes)) is not None:
             raise error
 
-    watch = Trouble(store, lambda: False)
+    watch = StateOutage(store, lambda: False)
     with monkeypatch.context() as disk:
         disk.setattr(os, "posix_fallocate", full)
         assert events(watch, turn, 3) == [SAID]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from gliderwatch.errors import Quarantine
-from gliderwatch.ingest.header import Header
 from gliderwatch.model import Segment, SegmentId
-from gliderwatch.run.backlog import Job
-from gliderwatch.run.turns import LONGEST, Turns
-from gliderwatch.store.sqlite import File, Status
+from gliderwatch.service.replay import LONGEST, ReplayOrder
+from gliderwatch.service.triage import Job
+from gliderwatch.slocum.header import Header
+from gliderwatch.store.state_file import File, Status
 from missions import segment
 
 
@@ -25,7 +25,7 @@ def job(glider: str, opened: float, sent: float | None) -> Job:
 def turns(*jobs: Job) -> list[tuple[str, float]]:
     """Names and times of sending as they come out."""
     order = sorted(jobs, key=lambda j: j.header.id)
-    found = Turns(order)
+    found = ReplayOrder(order)
     return [(j.header.id.name, sent) for one in order for j, sent in found.after(one)]
 
 
@@ -41,7 +41,7 @@ def test_each_glider_in_the_order_of_opening() -> None:
 
 def test_nobody_waits_for_a_mission_of_years_later() -> None:
     early, late = [job("a", 10.0 * k, 10.0 * k + 9) for k in range(5)], job("b", 1e9, 1e9 + 9)
-    found = Turns([*early, late])
+    found = ReplayOrder([*early, late])
     out = [[j.header.id.name for j, _ in found.after(one)] for one in early]
     assert out == [[f"a-{10 * k}"] for k in range(5)]
 

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gliderwatch.alerts.escalation import escalated
-from gliderwatch.alerts.unknown import CURES, Unjudged
-from gliderwatch.model import Alert, Expected, Hindrance, Kind, Severity, Unusable
+from gliderwatch.incidents.notifications import NotificationState, unacknowledged
+from gliderwatch.incidents.overdue import Sign
+from gliderwatch.incidents.unjudged import Unknown, announce, blindness
+from gliderwatch.messages.template import escalated
+from gliderwatch.messages.unjudged_text import CURES, Unjudged
+from gliderwatch.model import Alert, Hindrance, Kind, NextSurfacing, Severity, Unusable
 from gliderwatch.params import Attention
-from gliderwatch.rules.announce import Said, unanswered
-from gliderwatch.rules.silence import Sign
-from gliderwatch.rules.unknown import Unknown, announce, blindness
 
 HOUR, DAY = 3600.0, 86400.0
 T0 = 1_700_000_000.0
@@ -43,8 +43,8 @@ class Sea:
             self.lost.append(Unjudged(start, end, cause, words, "ab" if cause is Hindrance.NO_CACHE else ""))
         return self
 
-    def expected(self, until: float) -> Expected | None:
-        return Expected(T0, T0 + self.interval, 60.0, None, None, 0.0, 0.0, 0.0, "")
+    def expected(self, until: float) -> NextSurfacing | None:
+        return NextSurfacing(T0, T0 + self.interval, 60.0, None, None, 0.0, 0.0, 0.0, "")
 
     def judged(self, until: float) -> float | None:
         return max((t for t in self.flagged if t <= until), default=None)
@@ -92,7 +92,7 @@ def test_each_cause_is_told_with_its_cure_once_and_clears(cause: Unusable | Hind
 
 
 def test_every_cause_that_can_hold_for_long_has_a_cure() -> None:
-    never = {Hindrance.GONE, Hindrance.RENAMED}  # they are not counted (`store.known`)
+    never = {Hindrance.GONE, Hindrance.RENAMED}  # they are not counted (`store.state_file`)
     assert (set(Hindrance) | set(Unusable)) - never <= CURES.keys()
 
 
@@ -181,7 +181,7 @@ def test_while_it_goes_on_nobody_has_taken_it_on() -> None:
     for k in range(7):
         talk.hear(k, Unusable.NO_HEADING, "no heading")
     (alert,) = talk.alerts
-    assert unanswered(Said(unknown=talk.said), (), {}) == {alert.incident}
+    assert unacknowledged(NotificationState(unknown=talk.said), (), {}) == {alert.incident}
     assert "gliderwatch mute electa --hours 6" in escalated(alert, 1800.0).body
     talk.hear(7)
-    assert unanswered(Said(unknown=talk.said), (), {}) == frozenset()
+    assert unacknowledged(NotificationState(unknown=talk.said), (), {}) == frozenset()

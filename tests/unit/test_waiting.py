@@ -11,15 +11,14 @@ import pytest
 
 from alert_support import SLOW, alert, incident
 from announcing import World
-from gliderwatch.alerts import message
-from gliderwatch.alerts.escalation import escalated
+from gliderwatch.incidents.acknowledgement import acknowledge
+from gliderwatch.incidents.notifications import NotificationState, due_notifications, unacknowledged
+from gliderwatch.incidents.overdue import ExpectedCall, Silence
+from gliderwatch.incidents.send_schedule import AT_ONCE, NO_INCIDENT, Due, QuietHours, Standing, Wait
+from gliderwatch.incidents.send_schedule import due as goes_out
+from gliderwatch.messages import incident_text
+from gliderwatch.messages.template import escalated
 from gliderwatch.model import Incident, Severity
-from gliderwatch.rules.acknowledged import acknowledge
-from gliderwatch.rules.announce import Said, due, unanswered
-from gliderwatch.rules.overdue import Silence
-from gliderwatch.rules.silence import Awaited
-from gliderwatch.rules.waiting import AT_ONCE, NO_INCIDENT, Due, QuietHours, Standing, Wait
-from gliderwatch.rules.waiting import due as goes_out
 
 AMSTERDAM = ZoneInfo("Europe/Amsterdam")
 NEW = Standing(told=False, unanswered=True)
@@ -98,31 +97,31 @@ def test_an_escalation_heeds_quiet_hours_too() -> None:
 # --------------------------------------------------------------------------- what is unanswered
 
 
-def told(letters: str) -> tuple[Said, tuple[Incident, ...]]:
+def told(letters: str) -> tuple[NotificationState, tuple[Incident, ...]]:
     world = World.of(letters)
-    return due(Said(), world, None, False)[0], world.incidents()
+    return due_notifications(NotificationState(), world, None, False)[0], world.incidents()
 
 
 def test_an_open_incident_is_unanswered_until_somebody_takes_it_on_or_it_grows_worse() -> None:
     said, (one,) = told("0011")
-    assert unanswered(said, (one,), {}) == {one.id}
+    assert unacknowledged(said, (one,), {}) == {one.id}
     acks = {one.id: acknowledge(one, "Ann", "", 0.0)}
-    assert unanswered(said, (one,), acks) == frozenset()
+    assert unacknowledged(said, (one,), acks) == frozenset()
     worse = replace(one, worst=replace(one.worst, speed=0.02))
-    assert unanswered(said, (worse,), acks) == {one.id}
+    assert unacknowledged(said, (worse,), acks) == {one.id}
 
 
 def test_what_is_over_withdrawn_or_was_never_told_needs_no_answer() -> None:
     said, (one,) = told("0011")
-    assert unanswered(said, (replace(one, cleared_at=1e6),), {}) == frozenset()
-    assert unanswered(said, (), {}) == frozenset()
-    assert unanswered(Said(), (one,), {}) == frozenset()
+    assert unacknowledged(said, (replace(one, cleared_at=1e6),), {}) == frozenset()
+    assert unacknowledged(said, (), {}) == frozenset()
+    assert unacknowledged(NotificationState(), (one,), {}) == frozenset()
 
 
 def test_a_silence_is_unanswered_while_it_lasts() -> None:
-    silence = Silence("electa/overdue/1", Awaited(1.0, 2.0, 3.0, 1.0), 1, 1)
-    assert unanswered(Said(silences=(silence,)), (), {}) == {"electa/overdue/1"}
-    assert unanswered(Said(silences=(replace(silence, called=9.0),)), (), {}) == frozenset()
+    silence = Silence("electa/overdue/1", ExpectedCall(1.0, 2.0, 3.0, 1.0), 1, 1)
+    assert unacknowledged(NotificationState(silences=(silence,)), (), {}) == {"electa/overdue/1"}
+    assert unacknowledged(NotificationState(silences=(replace(silence, called=9.0),)), (), {}) == frozenset()
 
 
 # --------------------------------------------------------------------------- words
@@ -140,7 +139,7 @@ def test_an_escalated_message_says_why_it_comes_and_what_to_do() -> None:
 
 
 def test_a_mail_says_it_above_all_else() -> None:
-    made = message.opened(incident(), SLOW, alert_id="a", audience=Severity.CRITICAL)
+    made = incident_text.opened(incident(), SLOW, alert_id="a", audience=Severity.CRITICAL)
     told = escalated(replace(made, incident="electa/anomaly/1"), 60.0)
     place = told.html.index("Nobody has acknowledged this for 1 min")
     assert told.html.index("<body") < place < told.html.index("<b>ANOMALY electa")

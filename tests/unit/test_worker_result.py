@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine, Retry
-from gliderwatch.ingest.worker_result import decoded, encoded
 from gliderwatch.model import Series, readonly
+from gliderwatch.slocum.worker_result import decoded, encoded
 from missions import Leg, mission
 
 SEGMENT = mission([Leg()])[0]

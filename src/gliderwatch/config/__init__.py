@@ -5,13 +5,13 @@ raises `ConfigError` with every problem in it; `check` looks at the folders and 
 names.
 """
 
-from gliderwatch.config.checking import Link, check, linked_gliders
-from gliderwatch.config.loading import load
-from gliderwatch.config.paths import expand
-from gliderwatch.config.problem import Problem
-from gliderwatch.config.root import Config
-from gliderwatch.config.sections import Glider
-from gliderwatch.config.service import Channel, Dockserver, Recipient, State
+from __future__ import annotations
+
+from gliderwatch.config.check import Link, check, linked_gliders
+from gliderwatch.config.document import Problem
+from gliderwatch.config.fields import expand
+from gliderwatch.config.loading import Config, load
+from gliderwatch.config.schema import Channel, Dockserver, Glider, Recipient, State
 
 __all__ = [
     "Channel",

@@ -1,26 +1,101 @@
-"""Types of single settings: what may stand there and how it reads in the JSON Schema."""
+"""Types of single settings: what may stand there, paths among them, and the base of all sections."""
 
 from __future__ import annotations
 
+import glob
+import os
 import re
+from collections.abc import Iterable
 from datetime import UTC, datetime, time
 from difflib import get_close_matches
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any, get_origin
 from zoneinfo import ZoneInfo, available_timezones
 
 from pydantic import (
     AfterValidator,
+    BaseModel,
     BeforeValidator,
+    ConfigDict,
     Field,
     PlainSerializer,
     SecretStr,
     StringConstraints,
+    ValidationInfo,
     WithJsonSchema,
+    model_validator,
 )
 
-from gliderwatch.config import references
-from gliderwatch.config.paths import absolute
+from gliderwatch.config import secrets
 from gliderwatch.model import Severity
+
+# ----------------------------------------
+# Folders that the settings name by path or pattern.
+
+FROM_GLIDER = "from-glider"
+
+
+def absolute(path: str, info: ValidationInfo) -> str:
+    """A path from the settings, made absolute: relative ones start at the folder of the file."""
+    base = (info.context or {}).get("base")
+    expanded = os.path.expanduser(path)  # noqa: PTH111 (of Path it raises where there is no home)
+    return os.path.normpath(base / expanded) if base else expanded
+
+
+def expand(patterns: Iterable[str]) -> list[Path]:
+    """The folders or files that exist now for paths and glob patterns, each once, in order."""
+    found: dict[Path, None] = {}
+    for pattern in patterns:
+        matches = [pattern] if os.path.lexists(pattern) else sorted(glob.glob(pattern))  # noqa: PTH207
+        found.update(dict.fromkeys(map(Path, matches)))
+    return list(found)
+
+
+def is_folder(path: Path) -> bool:
+    """Whether a folder is there; False, unlike `Path.is_dir`, also where this user may not look."""
+    return os.path.isdir(path)  # noqa: PTH112
+
+
+# ----------------------------------------
+# The base of all sections of the settings. Pure but for pydantic.
+
+
+def _may_be_empty(schema: dict[str, Any]) -> None:
+    """In the JSON Schema too, what has no required keys may be left empty (`electa:`)."""
+    required = schema.get("required", [])
+    if not required:
+        schema["type"] = ["object", "null"]
+    for name, property_ in schema["properties"].items():
+        if property_.get("type") in {"array", "object"} and name not in required:
+            property_["type"] = [property_["type"], "null"]
+
+
+class Section(BaseModel):
+    """Base of all sections: frozen, unknown keys refused, inputs kept out of errors."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", hide_input_in_errors=True, json_schema_extra=_may_be_empty
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _empty_is_left_out(cls, data: object) -> object:
+        """A section or list whose lines are all commented out counts as left out."""
+        if data is None:
+            return {}
+        if not isinstance(data, dict):
+            return data
+        return {key: value for key, value in data.items() if value is not None or not cls._holds_more(key)}
+
+    @classmethod
+    def _holds_more(cls, key: str) -> bool:
+        field = cls.model_fields.get(key)
+        kind = field.annotation if field else None
+        return get_origin(kind) in {dict, tuple} or (isinstance(kind, type) and issubclass(kind, Section))
+
+
+# ----------------------------------------
+# Types of single settings: what may stand there and how it reads in the JSON Schema.
 
 
 def _severity(value: object) -> object:
@@ -96,7 +171,7 @@ def _switch(value: object) -> object:
 
 
 def _references(value: SecretStr) -> SecretStr:
-    references.verify(value.get_secret_value())
+    secrets.verify(value.get_secret_value())
     return value
 
 

@@ -1,226 +1,241 @@
-"""Algorithm 1 (001 eqs. 7, 9, 12, 13, 25-28): flow and through-water speed from a track. Pure.
+"""Algorithms 1 and 2 advanced dive by dive: the estimator `adaptive`. Pure.
 
-With e = x - z the learner is, as the paper has it,
-
-    z'  = xi phi(z,t) + V_L psi + beta,   beta = xi phi(x,t) - xi phi(z,t) + K e
-    xi' = gamma eps outer phi(x,t),       V_L' = speed_gain eps . psi,       eps = e - e_delta
-
-so that z' = xi phi(x,t) + V_L psi + K e, and the position error obeys
-
-    e'   = dx/dt - xi phi(x,t) - V_L psi - K e
-    eps' = dx/dt - xi phi(x,t) - sat(V_L) psi - K eps
-
-Euler's rule, which the paper uses, needs steps much shorter than 1/K; the files of a glider may
-hold a sample in half an hour. `advance` instead holds phi and psi over a substep at their values
-in its middle. What is left of the flow, F = xi phi, then changes by F' = gamma |phi|² eps, and
-along and across psi the equations part into two damped oscillators
-
-    eps' = r - K eps,   r' = -b eps
-
-(r: the velocity not yet explained; b = gamma |phi|², plus speed_gain |psi|² along psi unless the
-speed is saturated), whose solution is known. The Lyapunov function of 001 eq. (16) can not grow in
-such a substep, so that no spacing is unstable; the only error is that of phi within a substep.
+The learner is advanced over the track of each new dive and over nothing else: what the glider drifts at the
+surface between two dives is no flight. Basis functions are placed as the glider goes, or at
+the planned centres of the configuration.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field, replace
+from math import hypot
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gliderwatch.estimation.basis import Basis, Kernel, phi
-from gliderwatch.estimation.excitation import excitation, excite
-from gliderwatch.estimation.oscillator import response
-from gliderwatch.estimation.substeps import Complex, Substeps, cut
-from gliderwatch.model import Array, readonly
+from gliderwatch.estimation.dive_measurement import are_apart
+from gliderwatch.estimation.speed_range import Normal, RangeParams, learn, setting, speed_range
+from gliderwatch.estimation.unassessed import Reference, unassessed
+from gliderwatch.model import Array, Assessment, Current, Dive, Fix, Flag, Track, readonly
+from gliderwatch.navigation.geodesy import from_plane, to_plane
+from gliderwatch.navigation.track import closure
+from gliderwatch.papers.basis import new_centres, phi
+from gliderwatch.papers.flags import FlowMaxima, flag, p_e, update
+from gliderwatch.papers.learner import AdaptiveInfo, AdaptiveParams, AdaptiveState, advance, init, with_basis
+from gliderwatch.params import GliderParams
 
-
-@dataclass(frozen=True, slots=True)
-class AdaptiveParams:
-    """Gains and basis functions of the learner (000 Table I).
-
-    ``sigma`` width (m), ``kernel`` see `Basis`, ``omega`` angular frequency (rad/s), ``nu`` phase
-    (rad), ``k`` K (1/s; Table I has a multiple of the unit matrix), ``gamma`` learning rate of the
-    flow (1/s²), ``speed_gain`` that of the speed (1/s²; gamma when None, as in 001), ``max_speed``
-    u_0 (m/s) beyond which the learnt speed saturates (001 eq. 3; never when None).
-    Raises ValueError when sigma or k is not positive or a learning rate negative.
-    """
-
-    sigma: float
-    kernel: Kernel
-    omega: float
-    nu: float
-    k: float
-    gamma: float
-    speed_gain: float | None = None
-    max_speed: float | None = None
-
-    def __post_init__(self) -> None:
-        if not (self.sigma > 0.0 and self.k > 0.0):
-            raise ValueError(f"sigma and k must be positive, not {self.sigma} and {self.k}")
-        if not (self.gamma >= 0.0 and self.rate_of_speed >= 0.0):
-            raise ValueError(f"gamma and speed_gain must not be negative: {self.gamma}, {self.speed_gain}")
-
-    @property
-    def rate_of_speed(self) -> float:
-        """The learning rate of the speed that holds (1/s²)."""
-        return self.gamma if self.speed_gain is None else self.speed_gain
-
-    def basis(self, centres: object) -> Basis:
-        """The basis with these parameters around ``centres`` (m, shape (N, 2))."""
-        return Basis.uniform(centres, self.sigma, self.omega, self.nu, self.kernel)
+WARM_UP = 3.0
+"""Time constants K/gamma of the speed law: by then 95 % of an error of the first guess is gone."""
+STALE = 12 * 3600.0
+"""Seconds without a usable dive after which the sea may be another: the learner warms up anew."""
+LATEST = 12 * 3600.0
+"""Seconds for which the current of an earlier dive stands in for one that has not come yet."""
+FORGOTTEN = 6.0
+"""Widths sigma behind the glider at which a basis function that was placed on the way is let go."""
 
 
 @dataclass(frozen=True, slots=True)
-class AdaptiveState:
-    """What the learner knows.
+class Learner:
+    """State of the trajectory learner of one glider after a dive.
 
-    ``e`` = x - z (m, (2,)), the controlled Lagrangian localisation error: kept in place of z, so that
-    it stays good in another plane and after a drift at the surface. ``e_delta`` (m, (2,)), what of
-    it saturation explains. ``xi`` (m/s, (2, N)), weights of the flow. ``speed`` V_L (m/s). ``gram``
-    ((N+2, N+2)): forgetting mean over the flight of v outer v with v = [psi, phi], which holds
-    each entry of W (001 eq. 15) once; not yet divided by the weight of the time so far.
-    ``flown`` (s) is that time.
+    ``learner`` the state of Algorithm 1 (None: no dive yet), ``centres`` of its basis functions (degrees,
+    shape (N, 2): latitude, longitude), ``maxima`` of Algorithm 2, ``begun`` the start of the deployment (s),
+    ``end`` the fix that ended the last dive used, ``warm`` how much was flown since the last long gap (s),
+    ``current`` the last depth-averaged current and ``current_t`` when its dive surfaced (s), ``normal`` the
+    speeds of healthy dives.
     """
 
-    e: Array
-    e_delta: Array
-    xi: Array
-    speed: float
-    gram: Array
-    flown: float
+    learner: AdaptiveState | None = None
+    centres: Array = field(default_factory=lambda: readonly(np.empty((0, 2))))
+    maxima: FlowMaxima = FlowMaxima()
+    begun: float = 0.0
+    end: Fix | None = None
+    warm: float = 0.0
+    current: Current | None = None
+    current_t: float = 0.0
+    normal: Normal = Normal()
 
 
-@dataclass(frozen=True, slots=True)
-class AdaptiveInfo:
-    """What one call of `advance` found.
+def learner_params(params: GliderParams) -> AdaptiveParams:
+    """The parameters of Algorithm 1 among those of a glider."""
+    p = params.learner
+    return AdaptiveParams(p.sigma, p.kernel, p.omega, p.nu, p.k, p.gamma, p.speed_gain, p.max_speed)
 
-    ``clle_max``, greatest |e| (m) at the ends of the substeps; ``flow`` F_L = xi phi(z,t) at the end
-    (m/s, (2,)); ``flow_speed_max``, greatest |F_L| on the way (m/s); ``speed`` V_L at the end (m/s);
-    ``excitation``, smallest eigenvalue of W; ``n_steps``, number of substeps.
+
+def step(
+    state: Learner,
+    dive: Dive,
+    params: GliderParams,
+    digest: str,
+    frozen: bool = False,
+    other: Reference | None = None,
+) -> tuple[Learner, Assessment]:
+    """The estimate after one more dive, and what it says of the dive.
+
+    ``digest`` identifies the parameters; while ``frozen`` nothing is learnt of what is normal. ``other``
+    takes the place of the dive's current as the reference. A dive that cannot be used leaves the estimate
+    as it is and gets an assessment without a flag, with the reason.
     """
+    if dive.track is None or dive.start is None or dive.end is None:
+        return state, unassessed(dive, params, digest, dive.reason)
+    gains = learner_params(params)
+    state = _begin(state, dive, dive.start, params)
+    params = _with_range(state, dive, params)
+    learner, places, centres = _covering(state, dive.track, dive.start, params)
+    t, basis = dive.track.t - state.begun, gains.basis(centres)
+    if not learner.flown and dive.current is not None:
+        learner = _with_flow(learner, dive.current, phi(dive.track.x[0], t[0], basis))
+    before = learner
+    learner, info = advance(learner, t, dive.track.x, dive.track.heading, basis, gains)
+    reference, earlier = (other.current, False) if other is not None else _reference(state, dive)
+    maxima = update(state.maxima, info.flow_speed_max, hypot(reference.u, reference.v) if reference else 0.0)
+    state = replace(
+        state,
+        learner=learner,
+        centres=places,
+        maxima=maxima,
+        end=dive.end,
+        warm=state.warm + learner.flown - before.flown,
+        current=dive.current or state.current,
+        current_t=dive.t_surface if dive.current is not None else state.current_t,
+    )
+    judged = _judged(dive, params, digest, info, state, reference, earlier)
+    if other is not None:
+        judged = replace(judged, notes=(*judged.notes, *other.notes))
+    if params.speed_learnt and judged.flag == Flag.NORMAL and not frozen:
+        duration = dive.features.duration
+        normal = learn(state.normal, info.speed, setting(dive.features), duration, RangeParams())
+        state = replace(state, normal=normal)
+    return state, replace(judged, evidence={**judged.evidence, **_past(before)})
 
-    clle_max: float
-    flow: Array
-    flow_speed_max: float
-    speed: float
-    excitation: float
-    n_steps: int
+
+def learnt_flow(state: Learner, dive: Dive, params: GliderParams) -> Array | None:
+    """The flow (m/s, (2,)) that was learnt before a dive, where the dive ends; None before the first."""
+    if state.learner is None or dive.track is None or dive.start is None or not len(state.centres):
+        return None
+    centres = to_plane(state.centres[:, 0], state.centres[:, 1], dive.start.lat, dive.start.lon)
+    basis = learner_params(params).basis(centres)
+    t = float(dive.track.t[-1]) - state.begun
+    return np.asarray(state.learner.xi @ phi(dive.track.x[-1], t, basis))
 
 
-def init(speed: float, n_basis: int) -> AdaptiveState:
-    """The state before any track: no error, no flow, V_L = ``speed`` (m/s)."""
-    zero = readonly(np.zeros(2))
-    size = n_basis + 2
-    return AdaptiveState(
-        zero, zero, readonly(np.zeros((2, n_basis))), speed, readonly(np.zeros((size, size))), 0.0
+def _with_range(state: Learner, dive: Dive, params: GliderParams) -> GliderParams:
+    """The parameters with the range of speed that was learnt, once there is one."""
+    if not params.speed_learnt:
+        return params
+    found = speed_range(state.normal, setting(dive.features), RangeParams())
+    return params if found is None else replace(params, speed_min=found.low, speed_max=found.high)
+
+
+def _past(learner: AdaptiveState) -> dict[str, float]:
+    """What the learner knew before the dive, once it had learnt anything."""
+    return {"speed_before": learner.speed} if learner.flown else {}
+
+
+def _reference(state: Learner, dive: Dive) -> tuple[Current | None, bool]:
+    """The current to compare with, and whether it is that of an earlier dive, for want of its own."""
+    if dive.current is not None:
+        return dive.current, False
+    recent = state.current is not None and dive.t_surface - state.current_t < LATEST
+    return (state.current, True) if recent else (None, False)
+
+
+def _begin(state: Learner, dive: Dive, start: Fix, params: GliderParams) -> Learner:
+    """A new estimate at the start of a deployment, else the state as it is."""
+    if state.learner is not None and state.end is not None and not are_apart(state.end, start):
+        return state if dive.t_dive - state.end.t < STALE else replace(state, warm=0.0)
+    closed = closure(dive.track, dive.current) if dive.track and dive.current else None
+    speed = closed.along_speed if closed is not None else dive.features.onboard_speed
+    if speed is None or not 0.0 < speed < 2 * params.speed_max:
+        speed = (params.speed_min + params.speed_max) / 2
+    planned = np.array(params.learner.centres, dtype=np.float64).reshape(-1, 2)
+    return Learner(init(speed, len(planned)), readonly(planned), begun=dive.t_dive)
+
+
+def _covering(
+    state: Learner, track: Track, start: Fix, params: GliderParams
+) -> tuple[AdaptiveState, Array, Array]:
+    """The learner with functions that cover the track; their centres in degrees, and in its plane (m)."""
+    assert state.learner is not None
+    sigma, planned = params.learner.sigma, len(params.learner.centres)
+    centres = to_plane(state.centres[:, 0], state.centres[:, 1], start.lat, start.lon)
+    near = np.hypot(*(centres - track.x[-1]).T) < FORGOTTEN * sigma
+    near[:planned] = True
+    added = new_centres(centres[near], track.x, sigma)
+    learner = with_basis(_with_only(state.learner, near), len(added))
+    places = np.array([from_plane(c, start.lat, start.lon) for c in added]).reshape(-1, 2)
+    return (
+        learner,
+        readonly(np.concatenate([state.centres[near], places])),
+        np.concatenate([centres[near], added]),
     )
 
 
-def with_basis(state: AdaptiveState, n_more: int) -> AdaptiveState:
-    """The state with ``n_more`` functions appended to the basis, of weight 0 and not yet excited."""
-    return AdaptiveState(
-        e=state.e,
-        e_delta=state.e_delta,
-        xi=readonly(np.pad(state.xi, ((0, 0), (0, n_more)))),
-        speed=state.speed,
-        gram=readonly(np.pad(state.gram, (0, n_more))),
-        flown=state.flown,
+def _with_only(learner: AdaptiveState, kept: NDArray[np.bool_]) -> AdaptiveState:
+    """The learner with only those functions of its basis that are `kept`."""
+    rows = np.concatenate([[True, True], kept])  # the two of the heading come first
+    return replace(learner, xi=readonly(learner.xi[:, kept]), gram=readonly(learner.gram[rows][:, rows]))
+
+
+def _with_flow(learner: AdaptiveState, current: Current, values: Array) -> AdaptiveState:
+    """The first guess xi(0) that gives the current of the first dive where the functions have `values`."""
+    xi = np.outer([current.u, current.v], values) / max(float(values @ values), 1e-9)
+    return replace(learner, xi=readonly(xi))
+
+
+def _judged(
+    dive: Dive,
+    params: GliderParams,
+    digest: str,
+    info: AdaptiveInfo,
+    state: Learner,
+    reference: Current | None,
+    earlier: bool,
+) -> Assessment:
+    """Algorithm 2 on what the learner found, or the reason why it does not judge yet."""
+    flow = (float(info.flow[0]), float(info.flow[1]))
+    error = p_e(flow, (reference.u, reference.v), state.maxima) if reference is not None else None
+    notes = list(dive.notes)
+    reason, verdict = "", None
+    if state.warm < warm_up(params):
+        reason = "warming up"
+    elif reference is None and state.maxima.reference > 0.0 and params.reference == "dac":
+        reason = "no depth-averaged current"
+    else:
+        if reference is None and params.reference == "dac":
+            notes.append("no depth-averaged current in the files: a wrong flow cannot be told")
+        verdict = flag(error or 0.0, params.gamma_f, info.speed, params.speed_min, params.speed_max)
+        reason = _why(verdict, info.speed, params)
+    if earlier:
+        notes.append("depth-averaged current has not come: that of an earlier dive stands in")
+    elif reference is not None and not reference.final:
+        notes.append("depth-averaged current is provisional")
+    return replace(
+        unassessed(dive, params, digest, reason),
+        flag=None if verdict is None else int(verdict),
+        speed=info.speed,
+        flow_u=flow[0],
+        flow_v=flow[1],
+        reference_u=reference.u if reference else None,
+        reference_v=reference.v if reference else None,
+        reference_final=reference is not None and reference.final and not earlier,
+        p_e=error,
+        clle_max=info.clle_max,
+        excitation=info.excitation,
+        notes=tuple(notes),
     )
 
 
-def advance(
-    state: AdaptiveState,
-    t: Array,
-    x: Array,
-    heading: Array,
-    basis: Basis,
-    params: AdaptiveParams,
-) -> tuple[AdaptiveState, AdaptiveInfo]:
-    """Learn from one more stretch of the track.
-
-    ``t`` (s, shape (n,), increasing), ``x`` (m, (n, 2)), ``heading`` (unit vectors east, north, (n-1, 2))
-    holding from t[i] to t[i+1], or their mean where it turned within; a row of zeros means at the
-    surface: the speed is left alone there. The track is straight between its points. A track in
-    pieces gives what the whole gives.
-    Raises ValueError when the shapes do not fit, t does not increase or a number is not finite.
-    """
-    if state.xi.shape != (2, len(basis)):
-        raise ValueError(
-            f"{state.xi.shape[1]} weights for {len(basis)} basis functions: use with_basis first"
-        )
-    steps = cut(t, x, heading)
-    values = phi(*steps.middle, basis)
-    e, e_delta, speed, xi = _integrate(state, steps, values, params)
-    z = steps.x - e
-    flow = np.sum(xi * phi(np.column_stack([z.real, z.imag]), steps.t, basis), axis=1)
-    flown, gram = excite(state.flown, state.gram, steps, values)
-    after = AdaptiveState(
-        _pair(e[-1]), _pair(e_delta), readonly([xi[-1].real, xi[-1].imag]), speed, gram, flown
-    )
-    info = AdaptiveInfo(
-        clle_max=float(np.abs(e).max()),
-        flow=_pair(flow[-1]),
-        flow_speed_max=float(np.abs(flow).max()),
-        speed=speed,
-        excitation=excitation(flown, gram),
-        n_steps=len(steps.h),
-    )
-    return after, info
+def _why(verdict: Flag, speed: float, params: GliderParams) -> str:
+    """What a flag says, in words."""
+    if verdict == Flag.FALSE_ALARM:
+        return "the learnt flow does not fit the reference"
+    if verdict == Flag.NORMAL:
+        return ""
+    return "slower than normal" if speed < params.speed_min else "faster than normal"
 
 
-def _integrate(
-    state: AdaptiveState,
-    steps: Substeps,
-    values: Array,
-    params: AdaptiveParams,
-) -> tuple[Complex, complex, float, Complex]:
-    """Errors e (m+1,) and weights xi (m+1, N) at the ends of the substeps; e_delta and V_L at the last."""
-    u_0 = math.inf if params.max_speed is None else params.max_speed
-    speed, e, e_delta = state.speed, [complex(*state.e)], complex(*state.e_delta)
-    eps = e[0] - e_delta
-    xi = np.empty((len(steps.h) + 1, len(state.gram) - 2), dtype=np.complex128)
-    xi[0] = state.xi[0] + 1j * state.xi[1]
-    for i, (phi_i, rate, m, unit, fade, build, free, stiff) in enumerate(_rows(steps, values, params)):
-        flow = complex(xi[i] @ phi_i)
-        used = min(speed, u_0)
-        r = (rate - flow) * unit.conjugate() - m * used
-        eps *= unit.conjugate()
-        # beyond u_0 the speed no longer acts on eps, which leaves the stiffness of the flow alone
-        along = _moved(free if speed <= u_0 else stiff, eps.real, r.real)
-        across = _moved(stiff, eps.imag, r.imag)
-        end, integral = (complex(p, q) for p, q in zip(along, across, strict=True))
-        eps = unit * end
-        xi[i + 1] = xi[i] + (params.gamma * unit * integral) * phi_i
-        excess = used - speed
-        speed += params.rate_of_speed * m * integral.real
-        # the excess varies within the substep: the mean of its ends stands for it
-        excess = 0.5 * (excess + min(speed, u_0) - speed)
-        e_delta = fade * e_delta + build * excess * m * unit
-        e.append(eps + e_delta)
-    return np.array(e), e_delta, speed, xi
-
-
-def _moved(answer: Any, eps: float, r: float) -> tuple[float, float]:
-    """The error after a substep, and its integral over it, in one direction."""
-    a, c, q = answer
-    return a * eps + c * r, c * eps + q * r
-
-
-def _rows(steps: Substeps, values: Array, params: AdaptiveParams) -> Iterator[tuple[Any, ...]]:
-    """What `_integrate` needs of each substep, as Python numbers: much faster one by one than NumPy's."""
-    m = np.abs(steps.psi)
-    unit = np.where(m > 0.0, steps.psi, 1.0) / np.where(m > 0.0, m, 1.0)
-    square = np.sum(values * values, axis=1)
-    b, c = params.gamma * square, params.rate_of_speed * m * m
-    fade = np.exp(-params.k * steps.h)
-    free, stiff = response(params.k, b + c, steps.h), response(params.k, b, steps.h)
-    columns = (steps.rate, m, unit, fade, (1.0 - fade) / params.k, free, stiff)
-    return zip(values.astype(np.complex128), *(c.tolist() for c in columns), strict=True)
-
-
-def _pair(z: complex) -> Array:
-    return readonly([z.real, z.imag])
+def warm_up(params: GliderParams) -> float:
+    """Seconds of flight after which the first guess of the speed no longer matters."""
+    p = learner_params(params)
+    return WARM_UP * p.k / p.rate_of_speed if p.rate_of_speed > 0 else 0.0

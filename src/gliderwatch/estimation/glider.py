@@ -3,22 +3,135 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import hypot, sqrt
 
 import numpy as np
 
-from gliderwatch.currents import state as currents
-from gliderwatch.currents.field import Field
-from gliderwatch.currents.state import Currents
-from gliderwatch.estimation import jointly, learner
-from gliderwatch.estimation.ahead import mean_flow
-from gliderwatch.estimation.baseline import Baseline, learn, told
-from gliderwatch.estimation.flow import FlowParams
-from gliderwatch.estimation.jointly import Joint
-from gliderwatch.estimation.learner import Learner
-from gliderwatch.estimation.observation import PROVISIONAL, REPORTED, are_apart
-from gliderwatch.estimation.reference import Mean, Reference, of_learnt, of_model, of_tides
-from gliderwatch.model import Assessment, Dive, Fix, Flag
+from gliderwatch.estimation import adaptive
+from gliderwatch.estimation.adaptive import Learner
+from gliderwatch.estimation.dive_measurement import PROVISIONAL, REPORTED, are_apart
+from gliderwatch.estimation.healthy_baseline import Baseline, learn, told
+from gliderwatch.estimation.kalman import JointEstimate, JointInfo, JointParams, expected_flow
+from gliderwatch.estimation.speed_range import RangeParams
+from gliderwatch.estimation.unassessed import Mean, Reference, of_learnt, of_model, of_tides, unassessed
+from gliderwatch.estimation.verdict import SpeedParams, SpeedState, Verdict
+from gliderwatch.estimation.verdict import step as step_speed
+from gliderwatch.model import Assessment, Current, Dive, Fix, Flag
+from gliderwatch.papers.flags import FlowMaxima, p_e, update
 from gliderwatch.params import GliderParams
+from gliderwatch.sea import flow_forecast as currents
+from gliderwatch.sea.flow_forecast import Currents
+from gliderwatch.sea.gauss_markov import FlowParams
+from gliderwatch.sea.ocean_field import Field
+
+# ----------------------------------------
+# What the joint estimator says of a dive, as an assessment.
+
+APART = 16.0
+"""Squared misfit of flow and reference, in standard errors, that is no chance."""
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """State after a dive: of the estimator with its tests, and ``maxima`` of Algorithm 2."""
+
+    speed: SpeedState = SpeedState()
+    maxima: FlowMaxima = FlowMaxima()
+
+
+def speed_params(params: GliderParams) -> SpeedParams:
+    """The parameters of the joint estimator and of its tests among those of a glider."""
+    return SpeedParams(
+        joint=JointParams(alarms_per_month=params.alarms_per_month),
+        low=params.speed_min,
+        high=params.speed_max,
+        learning=RangeParams() if params.speed_learnt else None,
+    )
+
+
+def joint_step(
+    state: Joint,
+    dive: Dive,
+    params: GliderParams,
+    digest: str,
+    frozen: bool = False,
+    other: Reference | None = None,
+) -> tuple[Joint, Assessment]:
+    """The state after one more dive, and what it says of the dive.
+
+    ``digest`` identifies the parameters; while ``frozen`` nothing is learnt of what is normal. ``other``
+    takes the place of the dive's current as the reference; the estimate itself does not rest on it.
+    """
+    after, verdict = step_speed(state.speed, dive, speed_params(params), frozen)
+    if verdict.info is None:
+        told = None if verdict.flag is None else int(verdict.flag)
+        return state, replace(unassessed(dive, params, digest, verdict.reason), flag=told)
+    found, current = verdict.info.estimate, dive.current if other is None else other.current
+    flow = (float(found.flow[0]), float(found.flow[1]))
+    size = hypot(current.u, current.v) if current is not None else 0.0
+    maxima = update(state.maxima, hypot(*flow), size)
+    error = None if current is None else p_e(flow, (current.u, current.v), maxima)
+    flag, reason = verdict.flag, verdict.reason
+    if other is not None and flag == Flag.NORMAL and (error or 0.0) > params.gamma_f and _apart(found, other):
+        flag, reason = Flag.FALSE_ALARM, "the flow does not fit the reference"
+    plain = unassessed(dive, params, digest, reason)
+    assessment = replace(
+        plain,
+        flag=None if flag is None else int(flag),
+        speed=found.speed,
+        speed_min=verdict.normal.low,
+        speed_max=verdict.normal.high,
+        flow_u=flow[0],
+        flow_v=flow[1],
+        reference_u=None if current is None else current.u,
+        reference_v=None if current is None else current.v,
+        reference_final=current is not None and current.final,
+        p_e=error,
+        evidence={**plain.evidence, **_numbers(verdict, verdict.info)},
+        notes=_notes(dive, current, other),
+    )
+    return Joint(after, maxima), assessment
+
+
+def _apart(found: JointEstimate, other: Reference) -> bool:
+    """Whether flow and reference differ by more than the errors of both."""
+    assert other.current is not None
+    miss = found.flow - np.array([other.current.u, other.current.v])
+    return float(miss @ np.linalg.solve(found.flow_cov + other.cov, miss)) > APART
+
+
+def _notes(dive: Dive, current: Current | None, other: Reference | None) -> tuple[str, ...]:
+    if other is not None:
+        return (*dive.notes, *other.notes)
+    if current is None:
+        return (*dive.notes, "no depth-averaged current: a wrong flow cannot be told")
+    return dive.notes if current.final else (*dive.notes, "depth-averaged current is provisional")
+
+
+def _numbers(verdict: Verdict, info: JointInfo) -> dict[str, float]:
+    """What the joint estimator knows beside speed and flow, for people and rules."""
+    found = info.estimate
+    out = {
+        "speed_sigma": found.sigma,
+        "own_speed": found.own_speed,
+        "slip": found.slip[0],
+        "slip_sigma": found.slip[1],
+        "side": found.side[0],
+        "side_sigma": found.side[1],
+        "flow_sigma": sqrt(float(np.trace(found.flow_cov)) / 2),
+        "nis": info.nis / info.dof,
+    }
+    if verdict.normal.dives:
+        out |= {"usual_speed": verdict.normal.usual, "usual_dives": float(verdict.normal.dives)}
+    if info.loss is not None:
+        out["loss_ratio"] = info.loss.ratio
+    if info.across is not None:
+        out["across_misfit"], out["across_sigma"] = info.across
+    return out
+
+
+# ----------------------------------------
+# The estimator of one glider, dive by dive: the one that its settings choose, with its reference.
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +168,10 @@ def step(
         state = Estimate()  # another deployment: another sea, and perhaps another trim
     other = _reference(state, dive, params, ocean)
     if params.estimator == "joint":
-        joint, assessment = jointly.step(state.joint, dive, params, digest, frozen, other)
+        joint, assessment = joint_step(state.joint, dive, params, digest, frozen, other)
         after = state if joint is state.joint else replace(state, joint=joint)
     else:
-        learnt, assessment = learner.step(state.learner, dive, params, digest, frozen, other)
+        learnt, assessment = adaptive.step(state.learner, dive, params, digest, frozen, other)
         after = state if learnt is state.learner else replace(state, learner=learnt)
     if dive.track is None or dive.start is None or dive.end is None:
         return after, assessment
@@ -85,8 +198,8 @@ def _learnt(state: Estimate, dive: Dive, params: GliderParams) -> Mean | None:
     assert dive.start is not None and dive.end is not None
     joint = state.joint.speed.joint
     if joint is not None:
-        return mean_flow(joint, FlowParams(), np.zeros(2), dive.start.t, dive.end.t)
-    flow = learner.learnt_flow(state.learner, dive, params)
+        return expected_flow(joint, FlowParams(), np.zeros(2), dive.start.t, dive.end.t)
+    flow = adaptive.learnt_flow(state.learner, dive, params)
     return None if flow is None else (flow, np.zeros((2, 2)))
 
 

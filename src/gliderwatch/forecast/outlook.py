@@ -6,14 +6,12 @@ from math import expm1, sin
 
 import numpy as np
 
-from gliderwatch.estimation.ahead import mean_flow
-from gliderwatch.estimation.flow import FlowParams
+from gliderwatch.estimation.dive_measurement import DRAG_BY_LIFT, OWN, SLIP, USUAL_PITCH
 from gliderwatch.estimation.glider import Estimate
-from gliderwatch.estimation.joint import JointParams, JointState
-from gliderwatch.estimation.measurement import OWN, SLIP
-from gliderwatch.estimation.observation import DRAG_BY_LIFT, USUAL_PITCH
+from gliderwatch.estimation.kalman import JointParams, JointState, expected_flow
 from gliderwatch.forecast.surfacing import Flow
 from gliderwatch.model import Array
+from gliderwatch.sea.gauss_markov import FlowParams
 
 Outlook = tuple[float, float, Flow]
 """Speed through the water and its standard error (m/s), and the forecast of the flow."""
@@ -52,6 +50,6 @@ def _of_joint(joint: JointState, over_ground: Array) -> Outlook:
     slope[[OWN, SLIP]] = left, -own
 
     def flow(start: float, end: float) -> tuple[Array, Array]:
-        return mean_flow(joint, params, over_ground, start, end)
+        return expected_flow(joint, params, over_ground, start, end)
 
     return own * left, float(slope @ joint.cov @ slope) ** 0.5, flow

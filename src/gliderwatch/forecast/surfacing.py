@@ -1,28 +1,312 @@
-"""The next surfacing: when, where, and how sure. Pure.
-
-A surfacing is the first fix after a dive: only then a glider is heard and seen. From that fix it drifts at
-the surface, then it dives; the way to the next fix is
-
-    x = T_s (F + u) + T_d (V h + F)
-
-with T_s and T_d the times at the surface and under water, F the mean flow, u the drift at the surface beside
-it, V the speed through the water and h the mean heading vector. `docs/next-surfacing.md` says how each
-is found and how well it does.
-"""
+"""The next surfacing: when, where, and how sure, learnt from the past ones. Pure."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from statistics import median
 
 import numpy as np
 
+from gliderwatch.estimation.dive_measurement import are_apart
 from gliderwatch.forecast import timing
-from gliderwatch.forecast.learning import learn
-from gliderwatch.forecast.state import Surfacings, factor, plan
-from gliderwatch.forecast.steering import SLOWEST, WAYS, courses
-from gliderwatch.model import Array, Expected
-from gliderwatch.navigation.frame import from_plane
+from gliderwatch.forecast.steering import SLOWEST, WAYS, Plan, courses
+from gliderwatch.forecast.timing import quantile
+from gliderwatch.model import Array, Dive, Fix, NextSurfacing, Segment, Unusable
+from gliderwatch.navigation.geodesy import displacement, from_plane
+from gliderwatch.navigation.samples import joined
+
+# ----------------------------------------
+# What is remembered of past surfacings, and what follows from it for the way ahead.
+
+Place = tuple[float, float]
+"""Latitude and longitude (degrees)."""
+Vector = tuple[float, float]
+"""East and north."""
+
+DOUBT = 0.1
+"""Mean square error of a course before any dive, in parts of the speed squared."""
+CHANGE = 0.06
+"""m/s, a component: by how much a current differs from the one before, before it is known."""
+MISSES, MISSES_WEIGHT, MISSES_MEMORY = (0.3, 0.5, 0.7, 0.9, 1.2), 0.4, 0.95
+"""Distances from the place expected (parts of the 95 % ellipse) that stand for those of missions in general,
+the weight of each, and what is left of the weight of one made after each further dive."""
+LEAST, MOST = 0.4, 4.0
+"""Bounds of the factor on the axes of the ellipse."""
+CHI2 = 5.991
+"""95 % of squared distances in a plane, in standard errors, are below this."""
+NEAR = 200.0
+"""Metres: waypoints nearer than this are the same one, told with other decimals."""
+FAR = 0.01
+"""Degrees of latitude that are more than that for sure."""
+
+
+@dataclass(frozen=True, slots=True)
+class Surfacings:
+    """What is known after a surfacing.
+
+    ``fix`` of it; ``duration`` (s) of the last dive, ``intervals`` (s) between the last surfacings, with the
+    `timing.error` of those before they were over; ``surface`` (s) the times between fix and dive, and
+    ``drift`` (m/s) in them beside the current. ``heading`` the mean vector of the last dive (None: not
+    seen yet), ``lengths`` those of the last ones; ``speed`` (m/s) that the glider believes; ``current``
+    (m/s) of the last dive, ``change`` ((m/s)2, a component) the mean square of its changes;
+    ``bearing`` (rad) of the waypoint when that dive began. ``waypoints`` in order, the present one last;
+    ``scores`` of the ways of steering, mean square errors of their courses; ``misses``, see `factor`.
+    """
+
+    fix: Fix | None = None
+    duration: float = 0.0
+    intervals: tuple[float, ...] = ()
+    errors: tuple[float, ...] = ()
+    surface: tuple[float, ...] = ()
+    drift: Vector = (0.0, 0.0)
+    heading: Vector | None = None
+    lengths: tuple[float, ...] = ()
+    speed: float | None = None
+    current: Vector | None = None
+    change: float = CHANGE**2
+    bearing: float | None = None
+    waypoints: tuple[Place, ...] = ()
+    scores: tuple[float, ...] = (DOUBT,) * len(WAYS)
+    misses: tuple[float, ...] = ()
+
+
+def is_same(a: Place, b: Place) -> bool:
+    """Whether two waypoints are the same one.
+
+    >>> is_same((38.3892, -73.5), (38.389, -73.5)), is_same((38.38, -73.5), (38.389, -73.5))
+    (True, False)
+    """
+    return abs(a[0] - b[0]) < FAR and (a == b or float(np.hypot(*displacement(*a, *b))) < NEAR)
+
+
+def goals(state: Surfacings) -> tuple[Array, ...]:
+    """The waypoint, and the one that came after it when the glider last went there (m from the fix, (2,))."""
+    if state.fix is None or not state.waypoints:
+        return ()
+    *past, now = state.waypoints
+    after = [b for a, b in zip(past, state.waypoints[1:], strict=True) if is_same(a, now)]
+    return tuple(displacement(*place, state.fix.lat, state.fix.lon) for place in (now, *after[-1:]))
+
+
+def bearing(state: Surfacings) -> float | None:
+    """Bearing of the waypoint from the fix (rad, counter-clockwise from east); None without one."""
+    ahead = goals(state)
+    return math.atan2(ahead[0][1], ahead[0][0]) if ahead else None
+
+
+def plan(state: Surfacings, speed: float, current: Vector) -> Plan:
+    """What the glider knows of its way: it reckons with a speed and a current (m/s)."""
+    heading, length = np.array(state.heading or (0.0, 0.0)), max(state.lengths, default=1.0)
+    return Plan(heading, state.bearing, length, np.array(current), speed, goals(state))
+
+
+def factor(misses: Sequence[float]) -> float:
+    """By how much the axes of the ellipse must be longer than reckoned, for 95 % of places to be in it.
+
+    ``misses`` are the distances from the places expected, in parts of the ellipse as reckoned.
+    """
+    found = quantile(misses, MISSES, MISSES_WEIGHT, MISSES_MEMORY)
+    return min(max(found, LEAST), MOST)
+
+
+# ----------------------------------------
+# Which waypoint a glider was bound for when it came up.
+
+WaypointLog = tuple[tuple[float, float, float], ...]
+"""Waypoints as they were told: time (s), latitude and longitude (degrees), in order of time."""
+
+KEPT = 32
+"""Reports that are remembered: a corrected dive asks for the waypoint of some hours ago."""
+LATE = 300.0
+"""Seconds after a fix in which a file that ends with it may still tell the waypoint."""
+
+
+def read_waypoints(known: WaypointLog, segment: Segment) -> WaypointLog:
+    """The waypoints told until now and those in one more segment; what changes nothing is left out."""
+    t, lat, lon = joined(segment.get("waypoint_lat"), segment.get("waypoint_lon"))
+    told = zip(t.tolist(), lat.tolist(), lon.tolist(), strict=True)
+    out: list[tuple[float, float, float]] = []
+    for report in sorted({*known, *told}):
+        if not out or report[1:] != out[-1][1:]:
+            out.append(report)
+    return tuple(out[-KEPT:])
+
+
+def active_waypoint(known: WaypointLog, t: float) -> Place | None:
+    """The waypoint at a fix at time ``t`` (s), of those told; None before any.
+
+    >>> bound_for(((0.0, 27.0, -84.0), (9000.0, 27.5, -84.0)), 8000.0)
+    (27.0, -84.0)
+    """
+    before = [(lat, lon) for told, lat, lon in known if told <= t + LATE]
+    return before[-1] if before else None
+
+
+# ----------------------------------------
+# What a dive teaches of the next surfacing.
+
+FEW, MANY, HELD = 5, 30, 16
+"""Dives that tell habits, dives that tell errors, and waypoints of the past that are remembered."""
+MEMORY, WORST = 0.8, 2.0
+"""What is left of the score of a way of steering after each further dive; greatest square that counts."""
+CALM = 0.1
+"""Weight of the latest drift at the surface, and of `LONG_DRIFT` at least (s)."""
+LONG_DRIFT, FASTEST_DRIFT = 300.0, 1.0
+"""Seconds between two fixes that tell a drift; m/s beside the current that it is at most."""
+STEADY = 0.3
+"""Length of the mean heading vector from which the speed of a dive shows."""
+SLOWEST_LEG, FASTEST = 0.05, 1.5
+"""Bounds of the speed (m/s) that a glider believes."""
+UNSEEN = 1800.0
+"""s without data in which a glider may have been up."""
+
+
+def learn(
+    state: Surfacings, dive: Dive, waypoint: Place | None, expected: NextSurfacing | None = None
+) -> Surfacings:
+    """The state after one more dive; one that has not ended changes nothing.
+
+    Dives come in order; one whose current was corrected is taken again from the state before it.
+    ``waypoint`` (degrees) is the last one told until now; ``expected`` what was made of ``state``, with which
+    the ellipse is calibrated (None: nothing was). A new deployment begins anew.
+    """
+    end = dive.end
+    if end is None:
+        return state
+    if state.fix is not None and are_apart(state.fix, dive.start or end):
+        state = Surfacings()
+    after = replace(
+        _timed(state, dive, end),
+        scores=_scores(state, dive, end),
+        misses=_misses(state, dive, end, expected),
+        bearing=bearing(state),
+        waypoints=_waypoints(state.waypoints, waypoint),
+        fix=end,
+    )
+    return _driven(_adrift(_flown(after, dive), state.fix, dive), dive)
+
+
+def is_unseen(dive: Dive) -> bool:
+    """Whether data are missing before the end of a dive, so that the glider may have been up unnoticed."""
+    return dive.features.unobserved > UNSEEN or dive.unusable is Unusable.DATA_MISSING
+
+
+def _is_stale(dive: Dive) -> bool:
+    return dive.unusable is Unusable.STALE_FIX
+
+
+def ground(dive: Dive) -> Array | None:
+    """Velocity over ground (m/s, (2,)) between the fixes of a dive; None where one is not known or stale."""
+    if dive.start is None or dive.end is None or _is_stale(dive):
+        return None
+    moved = displacement(dive.end.lat, dive.end.lon, dive.start.lat, dive.start.lon)
+    return np.asarray(moved / max(dive.end.t - dive.start.t, 1.0))
+
+
+def _timed(state: Surfacings, dive: Dive, end: Fix) -> Surfacings:
+    """The state with the times of a dive."""
+    known = replace(state, duration=dive.t_surface - dive.t_dive)
+    if state.fix is None or is_unseen(dive):
+        return known
+    interval = max(end.t - state.fix.t, 1.0)
+    errors = state.errors
+    if state.intervals:
+        errors = (*errors, timing.error(interval, timing.usual(state.intervals)))
+    return replace(
+        known,
+        intervals=(*state.intervals, interval)[-timing.KEPT :],
+        errors=errors[-MANY:],
+        surface=(*state.surface, max(dive.t_dive - state.fix.t, 0.0))[-FEW:],
+    )
+
+
+def _scores(state: Surfacings, dive: Dive, end: Fix) -> tuple[float, ...]:
+    """The scores of the ways of steering, after what each says of a dive and how it was.
+
+    The way through the water is that over ground less the current: it is known without headings too.
+    """
+    over_ground, speed, known = ground(dive), state.speed, state.current
+    if over_ground is None or speed is None or known is None or state.fix is None or state.heading is None:
+        return state.scores
+    met = known if dive.current is None else (dive.current.u, dive.current.v)
+    really = (over_ground - met) / speed
+    made, scores = courses(plan(state, speed, known), max(end.t - state.fix.t, 1.0)), []
+    for score, course in zip(state.scores, made, strict=True):
+        part = (1 - MEMORY) * (1 - course.unknown)
+        square = min(float(np.sum((course.heading - really) ** 2)), WORST)
+        scores.append((1 - part) * score + part * square)
+    return tuple(scores)
+
+
+def _misses(state: Surfacings, dive: Dive, end: Fix, expected: NextSurfacing | None) -> tuple[float, ...]:
+    """The misses after one more dive, see `state.factor`."""
+    if expected is None or expected.lat is None or expected.lon is None or is_unseen(dive) or _is_stale(dive):
+        return state.misses
+    if state.fix is None or expected.after != state.fix.t:
+        return state.misses
+    off = displacement(end.lat, end.lon, expected.lat, expected.lon)
+    cov = np.array([[expected.east, expected.cross], [expected.cross, expected.north]])
+    distance = math.sqrt(float(off @ np.linalg.solve(cov, off)) / CHI2) * factor(state.misses)
+    return (*state.misses, distance)[-MANY:]
+
+
+def _waypoints(known: tuple[Place, ...], told: Place | None) -> tuple[Place, ...]:
+    if told is None or (known and is_same(known[-1], told)):
+        return known
+    return (*known, told)[-HELD:]
+
+
+def _flown(state: Surfacings, dive: Dive) -> Surfacings:
+    """The state with the mean heading vector of a dive, from fix to fix."""
+    if dive.track is None:
+        return state
+    dt = np.diff(dive.track.t)
+    east, north = (dt @ dive.track.heading / dt.sum()).tolist()
+    return replace(state, heading=(east, north), lengths=(*state.lengths, math.hypot(east, north))[-FEW:])
+
+
+def _adrift(state: Surfacings, before: Fix | None, dive: Dive) -> Surfacings:
+    """The state with the drift at the surface before a dive."""
+    if before is None or dive.start is None or state.current is None or _is_stale(dive):
+        return state
+    time = dive.start.t - before.t
+    if time < LONG_DRIFT or is_unseen(dive):
+        return state
+    moved = displacement(dive.start.lat, dive.start.lon, before.lat, before.lon)
+    beside = moved / time - state.current  # that of the dive before
+    east, north = (1 - CALM) * np.array(state.drift) + CALM * np.clip(beside, -FASTEST_DRIFT, FASTEST_DRIFT)
+    return replace(state, drift=(float(east), float(north)))
+
+
+def _driven(state: Surfacings, dive: Dive) -> Surfacings:
+    """The state with the current of a dive, and the speed that the glider believes."""
+    if dive.current is None:
+        return state
+    current, change = (dive.current.u, dive.current.v), state.change
+    if state.current is not None:
+        square = math.dist(current, state.current) ** 2 / 2
+        change = MEMORY * change + (1 - MEMORY) * min(square, 9 * change)
+    state = replace(state, current=current, change=change)
+    over_ground, heading = ground(dive), np.array(state.heading or (0.0, 0.0))
+    if dive.track is None or over_ground is None or np.hypot(*heading) < STEADY:
+        return state
+    own = float((over_ground - current) @ heading / (heading @ heading))
+    return replace(state, speed=min(max(own, SLOWEST_LEG), FASTEST))
+
+
+# ----------------------------------------
+# The next surfacing: when, where, and how sure. Pure.
+#
+# A surfacing is the first fix after a dive: only then a glider is heard and seen. From that fix it drifts
+# at the surface, then it dives; the way to the next fix is
+#
+#     x = T_s (F + u) + T_d (V h + F)
+#
+# with T_s and T_d the times at the surface and under water, F the mean flow, u the drift at the surface
+# beside it, V the speed through the water and h the mean heading vector. `docs/next-surfacing.md` says how
+# each is found and how well it does.
 
 __all__ = ["Flow", "Surfacings", "expect", "learn"]
 
@@ -42,7 +326,7 @@ a straight way, a glider is rather expected to follow its waypoint than to go on
 
 def expect(
     state: Surfacings, speed: float, speed_sigma: float, flow: Flow, surfacing_hours: float | None = None
-) -> Expected | None:
+) -> NextSurfacing | None:
     """The next surfacing after the last one; None before the first.
 
     ``speed`` through the water with its standard error (m/s), ``flow`` the forecast of the flow;
@@ -68,7 +352,7 @@ def expect(
         + GPS**2 * np.eye(2)
     )
     lat, lon = from_plane(displacement, fix.lat, fix.lon)
-    return Expected(
+    return NextSurfacing(
         after=fix.t,
         t=fix.t + interval,
         t_sigma=t_sigma,

@@ -1,31 +1,125 @@
-"""Segments in, dives out: the navigation of one glider, advanced segment by segment. Pure.
-
-A dive lies between two fixes. The fix that ends it, and the current that the glider computed for it,
-often come only with the next segment: so the state carries on the samples since the last fix,
-and a dive is told again when more of it is known.
-"""
+"""Segments in, dives out: the navigation of one glider, advanced segment by segment. Pure."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
-from gliderwatch.model import Dive, Fix, Segment, Series, Unusable, readonly
-from gliderwatch.navigation.clock import forward_step
-from gliderwatch.navigation.current import Known, Report, new_reports, pair, updated
+import numpy as np
+
+from gliderwatch.model import Dive, DiveFeatures, Fix, Segment, Series, Unusable, readonly
+from gliderwatch.navigation.clock import forward_step, span
+from gliderwatch.navigation.dac import Known, Report, new_reports, pair, updated
 from gliderwatch.navigation.features import flight_features, track_features
-from gliderwatch.navigation.fixes import FASTEST, SUSPECT, distance, new_fixes, stays
+from gliderwatch.navigation.fixes import FASTEST, SUSPECT, distance, new_fixes, surface_intervals
 from gliderwatch.navigation.flight import SPARSE, Flight, find_flight, lengthened, unseen
 from gliderwatch.navigation.pressure import zeroed
-from gliderwatch.navigation.quality import (
-    corrected_notes,
-    flight_notes,
-    heading_gap,
-    segment_notes,
-    why_unusable,
-)
 from gliderwatch.navigation.samples import Samples, after, concatenated, get, prepare
-from gliderwatch.navigation.track import build_track
+from gliderwatch.navigation.track import CIRCLING, build_track
+
+# ----------------------------------------
+# Whether a dive can be used, and what a reader should know of its data.
+
+UNOBSERVED = 0.25
+"""Share of the interval between two fixes that may be missing before a dive cannot be used."""
+BLIND = 0.8
+"""Share of a flight without any heading beyond which a dive cannot be used. Some files hold every
+third yo only: a glider on its way to a waypoint steers much the same in between."""
+STEADY = 0.9
+"""Length of the mean of the headings seen above which the glider is taken to have kept it in between."""
+SURFACE = 0.5
+"""Share of the interval between two fixes that the glider may have drifted before it cannot be used."""
+
+
+def why_unusable(
+    samples: Samples, flight: Flight, start: Fix | None, end: Fix | None, missing: float
+) -> tuple[Unusable | None, str]:
+    """Why the speed on a dive cannot be estimated, and the same in words; None and empty when it can.
+
+    `missing`: seconds between the fixes of which no segment has come.
+    """
+    if end is None:
+        return Unusable.NOT_SURFACED, "no fix"
+    if start is None:
+        return Unusable.NO_FIX_BEFORE, "no fix before the dive"
+    interval = end.t - start.t
+    if flight.evidence == "missing" or missing > UNOBSERVED * interval:
+        words = f"data missing: {missing / 3600:.1f} of {interval / 3600:.1f} h between two fixes"
+        return Unusable.DATA_MISSING, words
+    if interval - flight.duration > SURFACE * interval:
+        return Unusable.SURFACE_DRIFT, "mostly surface drift"
+    over_ground = distance(start, end) / interval
+    if over_ground > FASTEST:
+        return Unusable.WILD_FIX, f"wild fix: {over_ground:.0f} m/s over ground"
+    return _blind(samples, flight)
+
+
+def _blind(samples: Samples, flight: Flight) -> tuple[Unusable | None, str]:
+    """Why the headings of a flight do not do, and the same in words; None and empty when they do."""
+    gap = heading_gap(samples, flight)
+    if gap > BLIND * flight.duration:
+        return Unusable.NO_HEADING, f"no heading for {gap / 3600:.1f} h"
+    if gap > 2 * SPARSE and _heading_length(samples, flight) < STEADY:
+        return Unusable.TURNING, f"turning, and no heading for {gap / 3600:.1f} h"
+    return None, ""
+
+
+def heading_gap(samples: Samples, flight: Flight) -> float:
+    """The longest time (s) of a flight without a heading."""
+    heading = get(samples, "heading_e").between(flight.start, flight.end)
+    return float(np.diff(np.concatenate([[flight.start], heading.t, [flight.end]])).max())
+
+
+def _heading_length(samples: Samples, flight: Flight) -> float:
+    """Length of the mean of the headings seen: 1 on a steady course."""
+    e, n = (get(samples, f"heading_{c}").between(flight.start, flight.end).v for c in "en")
+    return float(np.hypot(e.mean(), n.mean()))
+
+
+def segment_notes(segment: Segment, declination: float | None, from_model: bool) -> tuple[str, ...]:
+    """Notes on the data of one segment; `declination` (rad) is the one used, perhaps `from_model`."""
+    notes = [f"{n} values of {name} out of range dropped" for name, n in sorted(segment.dropped.items())]
+    notes += segment.notes
+    if declination is None:
+        notes.append("magnetic declination unknown: headings and currents are relative to magnetic north")
+    elif from_model and segment.declination is not None:
+        notes.append(f"magnetic declination from the model {segment.declination_source}")
+    if not len(segment.get("heading")) and len(segment.get("heading_commanded")):
+        notes.append("commanded heading used, the measured one is not in the file")
+    return tuple(notes)
+
+
+def corrected_notes(ahead: float, surface: float) -> tuple[str, ...]:
+    """Notes on a clock that was set ``ahead`` (s), and on a depth sensor that shows ``surface`` (m) at the
+    surface; 0: neither."""
+    notes = []
+    if ahead:
+        notes.append(f"the glider's clock was set forward by {span(ahead)}, or it stayed at the surface")
+    if surface:
+        notes.append(f"depth is {surface:.1f} m at the surface: taken off (the pressure was not zeroed)")
+    return tuple(notes)
+
+
+def flight_notes(flight: Flight, features: DiveFeatures) -> tuple[str, ...]:
+    """What a reader of the assessment should know of the quality of a dive."""
+    notes = []
+    if flight.evidence == "heading":
+        notes.append("no depth or pitch in the file: drift at the surface cannot be told from flight")
+    if features.heading_steadiness is not None and features.heading_steadiness < max(CIRCLING, 0.5):
+        notes.append("the glider turned much: its speed is hardly observable")
+    if features.heading_gap is not None:
+        notes.append(f"no heading for {features.heading_gap / 3600:.1f} h of the dive: taken as steady")
+    if features.unobserved:
+        notes.append(f"{features.unobserved / 3600:.1f} h without data within the dive")
+    return tuple(notes)
+
+
+# ----------------------------------------
+# Segments in, dives out: the navigation of one glider, advanced segment by segment. Pure.
+#
+# A dive lies between two fixes. The fix that ends it, and the current that the glider computed for it,
+# often come only with the next segment: so the state carries on the samples since the last fix,
+# and a dive is told again when more of it is known.
 
 SHORTEST = 900.0
 """Seconds: a shorter stay under water says too little of speed, a shorter hole in the data is none."""
@@ -88,7 +182,7 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
     fixes = new_fixes(samples, state.fix)
     state, told = _withdraw_old_fix(state, fixes)
     untold = [state.untold] if state.untold is not None else []
-    for first, last in stays(fixes, DIP):
+    for first, last in surface_intervals(fixes, DIP):
         flight = _flight_since(state, samples, first)
         if flight is not None and flight.duration >= SHORTEST:
             told.append(_dive(state, segment.id.glider, samples, flight, first))

@@ -81,7 +81,7 @@ def _agree(a: Fix | None, b: Fix | None) -> bool:
     return a is not None and b is not None and b.t - a.t < SURFACE_SPELL and not _clash(a, b)
 
 
-def stays(fixes: list[Fix], apart: float) -> list[tuple[Fix, Fix]]:
+def surface_intervals(fixes: list[Fix], apart: float) -> list[tuple[Fix, Fix]]:
     """The first and the last fix of each stay, in which none is more than ``apart`` (s) after the one before.
 
     >>> [(a.t, b.t) for a, b in stays([Fix(t, 0.0, 0.0) for t in (0.0, 60.0, 120.0, 9000.0)], 120.0)]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gliderwatch.model import EMPTY, Array, Segment, Series, readonly
-from gliderwatch.navigation.frame import heading_vectors, magnetic_to_true
+from gliderwatch.navigation.geodesy import heading_vectors, magnetic_to_true
 
 Samples = Mapping[str, Series]
 
@@ -30,7 +30,7 @@ _FIRST = ("dr_", "waypoint_", "gps_status", "inflections")
 """Of those that jump, the first in each bin is kept: a mean would be a value that never was."""
 
 
-def compact(quantities: Mapping[str, Series]) -> dict[str, Series]:
+def downsample(quantities: Mapping[str, Series]) -> dict[str, Series]:
     """The quantities of a segment with samples finer than `SPACING` averaged.
 
     Angles of compass are averaged as vectors; of what jumps the first in each bin is kept, fixes
@@ -80,7 +80,7 @@ def prepare(segment: Segment, declination: float) -> Samples:
     """
     source = "heading" if len(segment.get("heading")) else "heading_commanded"
     wanted = (*_KEPT, "thruster_power", source, *(name for pair in _PAIRS for name in pair))
-    given = compact({name: segment.quantities[name] for name in wanted if name in segment.quantities})
+    given = downsample({name: segment.quantities[name] for name in wanted if name in segment.quantities})
     out = {name: given[name] for name in _KEPT if name in given}
     if "thruster_on" not in given and "thruster_power" in given:
         power = given["thruster_power"]

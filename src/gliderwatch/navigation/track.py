@@ -9,7 +9,7 @@ import numpy as np
 from gliderwatch.model import Array, Current, Fix, Track, readonly
 from gliderwatch.navigation.fixes import FASTEST
 from gliderwatch.navigation.flight import SPARSE, Flight
-from gliderwatch.navigation.frame import to_plane
+from gliderwatch.navigation.geodesy import to_plane
 from gliderwatch.navigation.samples import Samples, get
 
 NOMINAL_SPEED = 0.3

@@ -16,7 +16,7 @@ import numpy as np
 
 from gliderwatch.model import Array, Dive, Segment, Series, readonly
 from gliderwatch.navigation.dives import Navigation, extend
-from gliderwatch.navigation.frame import from_plane, magnetic_to_true
+from gliderwatch.navigation.geodesy import from_plane, magnetic_to_true
 from gliderwatch.navigation.track import closure
 
 _POSITIONS = ("fix", "dr")

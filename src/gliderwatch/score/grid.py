@@ -1,4 +1,4 @@
-"""What to run: every fault in every size and sea, and healthy gliders in every sea."""
+"""What to run: every fault in every size and sea, healthy gliders in every sea, and the estimators by name."""
 
 from __future__ import annotations
 
@@ -6,22 +6,68 @@ import re
 import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import msgspec
 
 import gliderwatch.config
-from gliderwatch.config.document import read
-from gliderwatch.config.problem import nearest
-from gliderwatch.errors import ConfigError
+from gliderwatch.config import Config, load
+from gliderwatch.config.document import nearest, read
+from gliderwatch.config.loading import presets_path
+from gliderwatch.errors import ConfigError, GliderwatchError
 from gliderwatch.score.graft import Graft, GraftKind
-from gliderwatch.score.record import HEALTHY
+from gliderwatch.score.measures import HEALTHY
 from gliderwatch.score.sensors import LEFT_OUT, cadence_without
-from gliderwatch.simulate.faults import SIZES, Fault, FaultKind
-from gliderwatch.simulate.scenario import Scenario
-from gliderwatch.simulate.scenarios import find, load, shipped
+from gliderwatch.simulate.scenario import SIZES, Fault, FaultKind, Scenario
+from gliderwatch.simulate.scenario_files import find, load_scenario, shipped
 from gliderwatch.simulate.seas import SEAS, sea_mission
+
+# ----------------------------------------
+# The estimators that can be scored, by name, and the settings that choose them.
+
+ALGORITHMS = ("joint", "adaptive")
+"""The values of `estimator:`, the default first."""
+
+
+def known() -> list[str]:
+    """All names: those of the algorithms with default settings, and `adaptive:PRESET`."""
+    return [*ALGORITHMS, *(f"adaptive:{name}" for name in read(presets_path()).data)]
+
+
+def check(name: str) -> str:
+    """The name itself. Raises GliderwatchError where there is no such estimator."""
+    names = known()
+    if name not in names:
+        raise GliderwatchError(f"there is no estimator {name}; known are: {', '.join(names)}")
+    return name
+
+
+@cache
+def configuration(name: str, glider: str, low: float, high: float) -> Config:
+    """The configuration of one glider with an estimator.
+
+    `joint` learns the normal range of speed as it does where the configuration says nothing; the others are
+    given it (m/s), as good as a pilot could know it. It is read from a file as the pilot's own, so that the
+    score knows no setting that a pilot cannot make. Raises GliderwatchError where there is no such estimator.
+    """
+    algorithm, _, preset = check(name).partition(":")
+    settings: dict[str, Any] = {"estimator": algorithm}
+    if algorithm != "joint":
+        settings["normal_speed"] = {"min": round(low, 4), "max": round(high, 4)}
+    if preset:
+        settings["preset"] = preset
+    document = {"dockserver": {"roots": ["."]}, "gliders": {glider: settings}}
+    with TemporaryDirectory(prefix="gliderwatch-") as folder:
+        path = Path(folder) / "gliderwatch.yml"
+        path.write_bytes(msgspec.json.encode(document))  # JSON is YAML
+        return load(path)
+
+
+# ----------------------------------------
+# What to run: every fault in every size and sea, and healthy gliders in every sea.
 
 DAY = 86400.0
 Sizes = tuple[float, ...]
@@ -217,7 +263,7 @@ def _sea(name: str) -> Callable[[int], Scenario]:
         raise ConfigError(
             f"there is no scenario {name}, no such kind of sea, nor a file of that name ({near})"
         )
-    scenario = load(find(name))
+    scenario = load_scenario(find(name))
     return lambda chance: scenario
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from gliderwatch.ingest.segment import QUANTITIES, declination_of
 from gliderwatch.model import Segment
+from gliderwatch.slocum.sensors import QUANTITIES, declination_of
 
 _HEADING = ("heading",)
 _ON_BOARD = ("speed_onboard",)

@@ -4,23 +4,119 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
 from rich.table import Table
 
-from gliderwatch.score import roc
+from gliderwatch.incidents.state_machine import RuleStates, advance
+from gliderwatch.model import Assessment, Flag, Kind
+from gliderwatch.params import RuleParams
+from gliderwatch.score.accuracy import NextScore, SpeedScore, next_scores, speed_scores
 from gliderwatch.score.measures import (
+    EXPECTED,
+    MONTH,
+    DiveResult,
     FalseScore,
     FaultScore,
     Interval,
+    OpenedIncident,
+    Record,
+    detection,
     false_scores,
+    false_told,
     fault_scores,
+    healthy_time,
 )
-from gliderwatch.score.record import Record
-from gliderwatch.score.speeds import SpeedScore, speed_scores
-from gliderwatch.score.surfacings import NextScore, next_scores
+
+# ----------------------------------------
+# What other bounds of the normal speed would have told, from recorded speeds. Pure.
+#
+# The estimate does not depend on the bounds, so that it need not be made anew: the flags are given again to
+# the speeds as known in the end, and put through the same rules.
+
+LOWER = (0.2, 0.3, 0.4, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95)
+"""Lower bounds as parts of the usual speed; the upper one lies as far above it as the lower one below."""
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """At a lower bound: the part of gliders with a loss of speed that was told, and false messages of flag 1
+    a glider-month."""
+
+    estimator: str
+    lower: float
+    detected: float
+    false: float
+
+
+def points(records: Sequence[Record], rules: RuleParams | None = None) -> list[Point]:
+    """The curve of each estimator over the simulated gliders."""
+    rules, found = rules or RuleParams(), []
+    for estimator in dict.fromkeys(r.estimator for r in records):
+        some = [r for r in records if r.estimator == estimator and not r.is_real]
+        for lower in LOWER:
+            again = [judged(r, lower, rules) for r in some]
+            slow = [r for r in again if EXPECTED.get(r.fault) == Flag.ANOMALY]
+            alone = list({r.glider: r for r in again}.values())
+            time = sum(map(healthy_time, alone))
+            if slow and time > 0:
+                share = sum(detection(r) is not None for r in slow) / len(slow)
+                false = sum(false_told(r, Flag.ANOMALY) for r in alone) * MONTH / time
+                found.append(Point(estimator, lower, share, false))
+    return found
+
+
+def judged(record: Record, lower: float, rules: RuleParams) -> Record:
+    """The record as it would be with another normal range: ``lower`` and 2 - ``lower`` of the usual speed."""
+    low, high = lower * record.usual, (2 - lower) * record.usual
+    watches, told = RuleStates(), list[OpenedIncident]()
+    seen: set[str] = set()
+    for dive in record.dives:
+        watches, incidents = advance(watches, _assessment(dive, low, high), rules)
+        for incident in incidents:
+            if incident.id not in seen:
+                seen.add(incident.id)
+                flag = Flag.ANOMALY if incident.kind == Kind.ANOMALY else Flag.FALSE_ALARM
+                told.append(OpenedIncident(int(flag), incident.opened_at, incident.opened_at))
+    return replace(record, low=low, high=high, told=tuple(told))
+
+
+def _assessment(dive: DiveResult, low: float, high: float) -> Assessment:
+    flag = dive.flag
+    if flag is not None and flag != Flag.FALSE_ALARM and dive.speed is not None:
+        flag = Flag.NORMAL if low <= dive.speed <= high else Flag.ANOMALY
+    return Assessment(
+        glider="",
+        segment="",
+        t_dive=dive.t_dive,
+        t_surface=dive.t_surface,
+        lat=None,
+        lon=None,
+        flag=flag,
+        reason="",
+        speed=dive.speed,
+        speed_min=low,
+        speed_max=high,
+        flow_u=None,
+        flow_v=None,
+        reference_u=None,
+        reference_v=None,
+        reference_final=False,
+        p_e=None,
+        gamma_f=0.0,
+        clle_max=None,
+        excitation=None,
+        n_samples=0,
+        evidence={},
+        notes=(),
+        parameters="",
+    )
+
+
+# ----------------------------------------
+# All measures of a run together, as values, as JSON and as tables for a terminal.
 
 _SEAS_IN_A_TABLE = 5
 """Columns of seas that fit beside each other."""
@@ -37,7 +133,7 @@ class Summary:
     false: tuple[FalseScore, ...]
     speeds: tuple[SpeedScore, ...]
     next: tuple[NextScore, ...]
-    roc: tuple[roc.Point, ...]
+    roc: tuple[Point, ...]
 
 
 def summarise(records: Sequence[Record], version: str) -> Summary:
@@ -51,7 +147,7 @@ def summarise(records: Sequence[Record], version: str) -> Summary:
         tuple(sorted(false_scores(order), key=lambda s: (s.is_real, s.estimator, s.sea == "", s.sea))),
         tuple(sorted(speed_scores(order), key=lambda s: (s.estimator, s.is_faulty, s.sea))),
         tuple(sorted(next_scores(order), key=lambda s: (s.is_real, s.estimator, s.sea))),
-        tuple(roc.points(records)),
+        tuple(points(records)),
     )
 
 

@@ -1,12 +1,17 @@
-"""One glider through the real program: its files are made, replayed, and what came of it is written down."""
+"""One glider through the real program (its files are made, replayed, and what came of it is kept), and all
+of them on all cores."""
 
 from __future__ import annotations
 
 import hashlib
 import math
+import multiprocessing
 import os
+import signal
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -18,35 +23,36 @@ import msgspec
 import gliderwatch
 from gliderwatch.config import Config
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.ingest.decode import Decoder
 from gliderwatch.model import Alert, Assessment, Kind, Segment
-from gliderwatch.run import intake
-from gliderwatch.run.intake import Taken
-from gliderwatch.run.replay import Request, cache_folders, find_files, replay
-from gliderwatch.run.speaking import NOBODY
-from gliderwatch.score.estimators import configuration
+from gliderwatch.score.accuracy import results as forecast_results
 from gliderwatch.score.graft import grafted, navigate, own_speeds
-from gliderwatch.score.grid import Cell
-from gliderwatch.score.record import HEALTHY, DiveResult, Record, Told
+from gliderwatch.score.grid import Cell, configuration
+from gliderwatch.score.measures import HEALTHY, DiveResult, OpenedIncident, Record
 from gliderwatch.score.sensors import LEFT_OUT, left_out
-from gliderwatch.score.surfacings import results as forecast_results
-from gliderwatch.simulate.delivery import FileForm, Names, arrivals
-from gliderwatch.simulate.dockserver import deliver, from_glider, write_cache
+from gliderwatch.service import transaction
+from gliderwatch.service.replay import Request, cache_folders, find_files, replay
+from gliderwatch.service.routing import NOBODY
+from gliderwatch.service.transaction import FileOutcome
+from gliderwatch.simulate.delivery import FileForm, Names, arrivals, deliver, from_glider, write_cache
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import DiveTruth, Mission
+from gliderwatch.slocum.decode import Decoder
 from gliderwatch.store.database import MEMORY
-from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.store.state_file import File, Status, Store
+
+# ----------------------------------------
+# One glider through the real program: its files are made, replayed, and what came of it is written down.
 
 _FLAGS = {Kind.ANOMALY: 1, Kind.FALSE_ALARM: 2}
 _NOT_SCORED = (
-    "alerts/channels.py",
-    "alerts/console.py",
-    "alerts/mail.py",
-    "alerts/outbox.py",
-    "cli.py",
-    "tables.py",
+    "delivery/channels.py",
+    "cli/tables.py",
+    "delivery/mail.py",
+    "delivery/dispatcher.py",
+    "cli/main.py",
+    "cli/tables.py",
 )
-_OF_SCORE = ("score/graft.py", "score/record.py", "score/sensors.py", "score/surfacings.py", "score/work.py")
+_OF_SCORE = ("score/graft.py", "score/measures.py", "score/sensors.py", "score/accuracy.py", "score/work.py")
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,9 +150,9 @@ def _replayed(
     onset = scenario.faults[0].onset if scenario.faults else None
     usual = _usual(mission.truth, onset if onset is not None else scenario.start + 5 * 86400)
     low, high = (part * usual for part in cell.normal)
-    told: list[Told] = []
+    told: list[OpenedIncident] = []
 
-    def on_file(taken: Taken) -> None:
+    def on_file(taken: FileOutcome) -> None:
         told.extend(_openings(taken.alerts, on_shore[taken.file.path]))
 
     config = configuration(estimator, scenario.glider, low, high)
@@ -182,10 +188,10 @@ def _usual(truth: Sequence[DiveTruth], until: float) -> float:
     return median(dive.believed_speed for dive in truth if dive.t_surface < until)
 
 
-def _openings(alerts: Iterable[Alert], on_shore: float) -> list[Told]:
+def _openings(alerts: Iterable[Alert], on_shore: float) -> list[OpenedIncident]:
     """The messages that open an incident; one cannot be told before its surfacing."""
     return [
-        Told(_FLAGS[alert.kind], alert.time, max(alert.time, on_shore))
+        OpenedIncident(_FLAGS[alert.kind], alert.time, max(alert.time, on_shore))
         for alert in alerts
         if alert.kind in _FLAGS
     ]
@@ -290,12 +296,72 @@ def _run_real(cell: Cell, mission: Path, estimators: Iterable[str]) -> list[Reco
     return out
 
 
-def _fed(segments: Iterable[Segment], config: Config) -> tuple[Store, tuple[Told, ...]]:
+def _fed(segments: Iterable[Segment], config: Config) -> tuple[Store, tuple[OpenedIncident, ...]]:
     """A store that has taken the segments in, and what was told. When a file came to shore is not known of a
     real mission: not before the last value in it."""
-    store, told = Store.open(MEMORY), list[Told]()
+    store, told = Store.open(MEMORY), list[OpenedIncident]()
     for segment in segments:
         file = File(segment.id.name, 0, 0, Status.WAITING, segment.id.glider, segment.id.name)
-        taken = intake.take(store, file, segment, config.glider(segment.id.glider), NOBODY, 0.0)
+        taken = transaction.process_file(store, file, segment, config.glider(segment.id.glider), NOBODY, 0.0)
         told += _openings(taken.alerts, segment.last_t)
     return store, tuple(told)
+
+
+# ----------------------------------------
+# All cells on all cores; what is done stays done.
+
+
+def to_do(cells: Iterable[Cell], estimators: Sequence[str], out: Path) -> list[Task]:
+    """The cells of which a result is still missing."""
+    tasks = []
+    for cell in cells:
+        paths = {e: result_path(out, cell, e) for e in estimators}
+        missing = {e: path for e, path in paths.items() if read_result(path) is None}
+        if missing:
+            tasks.append(Task(cell, tuple(missing), tuple(missing.values())))
+    return tasks
+
+
+def run_all(tasks: Sequence[Task], on_done: Callable[[], None]) -> list[str]:
+    """Run tasks in worker processes, as many as cores; what went wrong, in words.
+
+    Stopped from the keyboard, it leaves the results of what was done.
+    """
+    if not tasks:
+        return []
+    cores = len(os.sched_getaffinity(0))
+    context = multiprocessing.get_context("spawn")  # to fork a process with threads is unsafe
+    failed: dict[str, None] = {}  # of one mission all cells fail alike
+    with ProcessPoolExecutor(min(cores, len(tasks)), mp_context=context) as pool:
+        with _deaf():  # to Ctrl-C, for good: it is this process that ends them, without a word of theirs
+            futures = [pool.submit(work, task) for task in tasks]
+        try:
+            for future in as_completed(futures):
+                try:
+                    future.result()
+                except GliderwatchError as error:
+                    failed[str(error)] = None
+                on_done()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for worker in multiprocessing.active_children():
+                worker.terminate()
+            raise
+    return list(failed)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Processes that begin inside do not hear Ctrl-C; this one hears it afterwards."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def results(cells: Iterable[Cell], estimators: Iterable[str], out: Path) -> list[Record]:
+    """The results that there are, estimator by estimator, in the order of the cells."""
+    cells = list(cells)
+    found = (read_result(result_path(out, cell, e)) for e in estimators for cell in cells)
+    return [record for record in found if record is not None]

@@ -1,26 +1,40 @@
-"""One glider's mission, simulated with its truth. Pure given the seed of the scenario.
-
-The glider dives in a sawtooth towards its waypoints, surfaces at intervals, drifts while it
-communicates, and dives again. What it believes of all this goes into its log; the log becomes
-segments. Everything happens on the grid of the glider's cycle (4 s) since the start of the mission.
-"""
+"""The mission of one glider, or of a fleet in one sea, simulated with its truth. Pure given the seed of the
+scenario."""
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from gliderwatch.simulate.dinkum import Header
 from gliderwatch.simulate.dive import dive
 from gliderwatch.simulate.ocean import Ocean, make_ocean
-from gliderwatch.simulate.onboard import displacement
+from gliderwatch.simulate.onboard import Point, displacement, offset
 from gliderwatch.simulate.scenario import DiveTruth, Mission, Scenario
-from gliderwatch.simulate.sensors import SCIENCE_SENSORS, SCIENCE_TIME, SENSORS, TIME, sensor_list
 from gliderwatch.simulate.surfacing import surface
-from gliderwatch.simulate.telemetry import CYCLE, SCIENCE_CYCLE, Log, SegmentData, Selection, everything
+from gliderwatch.simulate.telemetry import (
+    CYCLE,
+    SCIENCE_CYCLE,
+    SCIENCE_SENSORS,
+    SCIENCE_TIME,
+    SENSORS,
+    TIME,
+    Log,
+    SegmentData,
+    Selection,
+    everything,
+    sensor_list,
+)
 from gliderwatch.simulate.vehicle import Glider
+
+# ----------------------------------------
+# One glider's mission, simulated with its truth. Pure given the seed of the scenario.
+#
+# The glider dives in a sawtooth towards its waypoints, surfaces at intervals, drifts while it
+# communicates, and dives again. What it believes of all this goes into its log; the log becomes
+# segments. Everything happens on the grid of the glider's cycle (4 s) since the start of the mission.
 
 _SENDING = (60.0, 240.0)
 _SCIENCE_LEAD = 5.0
@@ -160,3 +174,44 @@ class _Files:
         segments, science, full_rate = (tuple(kind) for kind in self.kinds)
         wanted = science if self.glider.scenario.science else ()
         return Mission(self.glider.scenario, segments, truth, wanted, full_rate)
+
+
+# ----------------------------------------
+# Several gliders in one sea.
+
+_SPACING = 4000.0
+_ROW = 5
+
+
+def fleet(scenario: Scenario, n: int) -> list[Scenario]:
+    """The scenarios of ``n`` gliders, 4 km apart in rows of five, each with waypoints of its own.
+
+    They share the sea. The faults go to the gliders in turn: the first to the first glider, and so
+    on; who gets none is healthy. One glider alone is the scenario itself.
+
+    Raises:
+        ValueError: not one glider.
+    """
+    if n < 1:
+        raise ValueError("a fleet has at least one glider")
+    if n == 1:
+        return [scenario]
+    return [_member(scenario, i, n) for i in range(n)]
+
+
+def _member(scenario: Scenario, i: int, n: int) -> Scenario:
+    east, north = np.array(_SPACING * (i % _ROW)), np.array(_SPACING * (i // _ROW))
+
+    def moved(place: Point) -> Point:
+        lat, lon = offset(place, east, north)
+        return Point(float(lat), float(lon))
+
+    return replace(
+        scenario,
+        glider=f"{scenario.glider}-{i + 1:02d}",
+        member=i,
+        place=moved(scenario.place),
+        waypoints=tuple(map(moved, scenario.waypoints)),
+        origin=scenario.place,
+        faults=scenario.faults[i::n],
+    )

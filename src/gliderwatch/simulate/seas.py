@@ -23,13 +23,12 @@ from math import cos, pi, sin, sqrt
 
 import numpy as np
 
-from gliderwatch.ingest.segment import model_declination
-from gliderwatch.simulate.faults import Fault
 from gliderwatch.simulate.ocean import Constituent, Ellipse, Front, Sea
 from gliderwatch.simulate.onboard import Point, Vector, offset
-from gliderwatch.simulate.scenario import FixIn, Scenario
-from gliderwatch.simulate.sensors import CADENCE
+from gliderwatch.simulate.scenario import Fault, FixIn, Scenario
+from gliderwatch.simulate.telemetry import CADENCE
 from gliderwatch.simulate.water import Bottom, Water
+from gliderwatch.slocum.sensors import model_declination
 
 Range = tuple[float, float]
 _NOTHING: Range = (0.0, 0.0)

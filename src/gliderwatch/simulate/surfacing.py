@@ -1,18 +1,153 @@
-"""At the surface: fixes, and the depth-averaged current that follows from the misfit."""
+"""At the surface: drift, fixes, and the depth-averaged current that follows from the misfit. Pure."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from math import hypot
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gliderwatch.simulate.fixes import Fixes, Plan, drift, heard, make_plan, seen_drift
-from gliderwatch.simulate.instruments import DR_AWAITING_DIVE, DR_AWAITING_FIX, DR_AWAITING_POSTFIX
-from gliderwatch.simulate.onboard import Vector, displacement, turn, written
-from gliderwatch.simulate.scenario import DiveTruth
+from gliderwatch.model import Array
+from gliderwatch.simulate.dive import DR_AWAITING_DIVE, DR_AWAITING_FIX, DR_AWAITING_POSTFIX
+from gliderwatch.simulate.onboard import Point, Vector, displacement, offset, turn, written
+from gliderwatch.simulate.scenario import DiveTruth, FixIn
 from gliderwatch.simulate.telemetry import CYCLE, SCIENCE_CYCLE
-from gliderwatch.simulate.vehicle import Flown, Glider
+from gliderwatch.simulate.vehicle import NODE, Flown, Glider
+
+# ----------------------------------------
+# Drift at the surface, and the fixes that a glider has of it.
+
+BURST = 16
+"""Fixes in a row at both ends of a stay at the surface."""
+
+_BETWEEN = 8
+_GUST = 0.3
+_FAST_NOISE = 0.1
+_SEARCHING = (60.0, 240.0)
+
+
+class Plan(NamedTuple):
+    """Cycles of a surfacing: up, file closed, next dive's file opened, first fix, last row of fixes,
+    down; first and last cycle of the surface's own file, if it has one; whether the first fixes
+    reported are the old one, and whether a new mission begins."""
+
+    up: int
+    closed: int
+    opened: int
+    first: int
+    last: int
+    down: int
+    own_file: tuple[int, int] | None
+    stale: bool
+    restart: bool
+
+
+class Fixes(NamedTuple):
+    """Fixes: cycles, latitudes and longitudes (degrees)."""
+
+    cycles: NDArray[np.int64]
+    lat: Array
+    lon: Array
+
+    def point(self, i: int) -> Point:
+        """The i-th place."""
+        return Point(float(self.lat[i]), float(self.lon[i]))
+
+    def since(self, cycle: int) -> Fixes:
+        """The fixes from a cycle on."""
+        i = int(np.searchsorted(self.cycles, cycle))
+        return Fixes(self.cycles[i:], self.lat[i:], self.lon[i:])
+
+
+def make_plan(glider: Glider) -> Plan:
+    """Draw the times of a surfacing.
+
+    With the fix in the dive's own file, that file is closed after the fix, GPS is off during the
+    communication, and the next file begins after it. Otherwise the file is closed at once, and
+    the next one, opened in the next cycle, holds fix and communication. A glider with a file for
+    each stay at the surface opens it after the communication, or in the latter case before it, and
+    closes it before the next dive's.
+    """
+
+    def cycles(least: float, most: float) -> int:
+        return round(glider.rng.uniform(least, most) / CYCLE)
+
+    scenario, rates, luck = glider.scenario, glider.scenario.rates, glider.luck.random(3)
+    up, talk = glider.cycle, cycles(*scenario.communications)
+    first, brief = up + cycles(40, 70), round((10 + 50 * luck[0]) / CYCLE)
+    own_file = None
+    if scenario.fix_in is FixIn.OWN:
+        closed = first + cycles(80, 120)
+        opened = closed + talk
+        if scenario.surface_segments:
+            own_file = (opened, opened + brief)
+            opened += brief + 1
+        last = opened + cycles(24, 40)
+    else:
+        closed = up + cycles(8, 20)
+        opened = closed + 1
+        last = first + BURST + talk
+        if scenario.surface_segments:
+            own_file = (opened, last + BURST + brief)
+            opened = own_file[1] + 1
+    down = max(last + BURST + cycles(12, 40), opened + 1)
+    stale, restart = bool(luck[1] < rates.stale_fix), bool(luck[2] < rates.restart)
+    return Plan(up, closed, opened, first, last, down, own_file, stale, restart)
+
+
+def drift(glider: Glider, plan: Plan) -> Fixes:
+    """Drift with current and wind from surfacing to diving; fixes on the way.
+
+    The error of a fix is mostly slow, so it differs between the ends of a surfacing, not between fixes.
+    """
+    scenario, rng = glider.scenario, glider.rng
+    nodes = np.unique(np.append(np.arange(plan.up, plan.down, NODE), plan.down))
+    t = scenario.start + CYCLE * nodes
+    gust = 1 + _GUST * rng.standard_normal(2)
+    east = scenario.wind_drift.east * gust[0] * (t - t[0])
+    north = scenario.wind_drift.north * gust[1] * (t - t[0])
+    far_east, far_north = glider.carried(t, east, north)
+    east, north = east + far_east, north + far_north
+    between = np.arange(plan.first, plan.closed if scenario.fix_in is FixIn.OWN else plan.last, _BETWEEN)
+    bursts = [start + np.arange(BURST) for start in (plan.first, plan.last)]
+    cycles = np.unique(np.concatenate([between, *bursts]))
+    slow = scenario.gps_sigma * rng.standard_normal((2, 2))
+    fast = _FAST_NOISE * scenario.gps_sigma * rng.standard_normal((2, len(cycles)))
+    ends = [plan.first, plan.last]
+    lat, lon = offset(
+        glider.place,
+        np.interp(cycles, nodes, east) + np.interp(cycles, ends, slow[0]) + fast[0],
+        np.interp(cycles, nodes, north) + np.interp(cycles, ends, slow[1]) + fast[1],
+    )
+    glider.move(plan.down, float(east[-1]), float(north[-1]))
+    return Fixes(cycles, lat, lon)
+
+
+def heard(glider: Glider, plan: Plan, fixes: Fixes) -> Fixes:
+    """The fixes that the glider really has: without those in whose place the old one is reported."""
+    if not plan.stale:
+        return fixes
+    if glider.scenario.fix_in is FixIn.OWN:
+        return fixes.since(plan.last)
+    return fixes.since(plan.first + round(glider.luck.uniform(*_SEARCHING) / CYCLE))
+
+
+def seen_drift(glider: Glider, fixes: Fixes) -> Vector:
+    """Drift (m/s, true north) between the first and the last row of fixes; without these the drift before."""
+    duration = CYCLE * float(fixes.cycles[-BURST:].mean() - fixes.cycles[:BURST].mean())
+    if duration < 60:
+        return glider.drift
+    lon = fixes.lon if np.ptp(fixes.lon) < 180 else fixes.lon % 360  # a mean over the antimeridian
+    first = Point(float(fixes.lat[:BURST].mean()), float(lon[:BURST].mean()))
+    last = Point(float(fixes.lat[-BURST:].mean()), float(lon[-BURST:].mean()))
+    way = displacement(first, last)
+    return Vector(way.east / duration, way.north / duration)
+
+
+# ----------------------------------------
+# At the surface: fixes, and the depth-averaged current that follows from the misfit.
 
 _WAVES = 0.04
 _GARBAGE = 0.3

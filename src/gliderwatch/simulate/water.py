@@ -1,4 +1,4 @@
-"""Temperature and salinity of a layered sea, and its bottom. Pure."""
+"""Temperature, salinity and conductivity of a layered sea, and its bottom. Pure."""
 
 from __future__ import annotations
 

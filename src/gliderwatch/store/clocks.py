@@ -7,14 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from gliderwatch.model import SegmentId
-from gliderwatch.navigation.clock import (
-    SAME_OPENING,
-    ClockStep,
-    Correction,
-    Stamp,
-    corrections,
-    numbered,
-)
+from gliderwatch.navigation.clock import SAME_OPENING, ClockStep, Correction, Stamp, corrections, numbered
 
 FIRST = 2
 """`milestone` of a segment before which nothing is kept any more."""

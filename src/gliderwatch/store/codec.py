@@ -1,23 +1,28 @@
-"""How states and segments are written down: JSON, versioned, compressed. Never pickle.
-
-A record is zlib-compressed UTF-8 JSON of ``{"v": version, "data": ...}``. Values are objects with
-the fields of their dataclass; an array is ``{"shape": [...], "f64": "..."}`` with its little-endian
-float64 bytes in base64, so that every bit comes back. `docs/state-file.md` shows how to look into one.
-A record of an earlier layout is converted when it is read (`conversion`).
-"""
+"""How states and segments are written down (JSON, versioned, compressed, never pickle), and rows as values."""
 
 from __future__ import annotations
 
 import base64
+import sqlite3
 import zlib
+from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
 
 from gliderwatch.errors import DamagedError, LayoutError, StateError
-from gliderwatch.model import readonly
+from gliderwatch.model import Hindrance, readonly
 from gliderwatch.store import conversion
+
+# ----------------------------------------
+# How states and segments are written down: JSON, versioned, compressed. Never pickle.
+#
+# A record is zlib-compressed UTF-8 JSON of ``{"v": version, "data": ...}``. Values are objects with
+# the fields of their dataclass; an array is ``{"shape": [...], "f64": "..."}`` with its little-endian
+# float64 bytes in base64, so that every bit comes back. `docs/state-file.md` shows how to look into one.
+# A record of an earlier layout is converted when it is read (`conversion`).
 
 T = TypeVar("T")
 
@@ -105,3 +110,69 @@ def _to_array(kind: Any, value: Any) -> Any:
         return readonly(raw.reshape(value["shape"]))
     except KeyError as error:
         raise ValueError(f"an array without {error}") from None
+
+
+# ----------------------------------------
+# Rows of the state file as values.
+
+R = TypeVar("R")
+
+
+class Status(StrEnum):
+    """What became of a file."""
+
+    TAKEN = "taken"
+    DUPLICATE = "duplicate"
+    WAITING = "waiting"
+    QUARANTINED = "quarantined"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class File:
+    """A row of the ledger: ``hindrance`` and, in words, ``reason`` say why it was not taken.
+
+    ``crc`` names the cache file that it waits for.
+
+    ``opened_at`` (s) of its header is not in the row: it makes the file a sign of life when it is noted.
+    """
+
+    path: str
+    size: int
+    mtime_ns: int
+    status: Status
+    glider: str = ""
+    segment: str = ""
+    reason: str = ""
+    crc: str = ""
+    opened_at: float | None = field(default=None, compare=False)
+    hindrance: Hindrance | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Undelivered:
+    """A message that waits for a channel; ``error`` is the reason of the last failed attempt.
+
+    It is not sent before ``held_until`` (s), and not at all where its incident is acknowledged by then, if
+    ``escalates``.
+    """
+
+    alert: str
+    channel: str
+    attempts: int
+    error: str
+    held_until: float = 0.0
+    escalates: bool = False
+
+
+def file_of(row: sqlite3.Row) -> File:
+    """The row of the ledger."""
+    names = ("path", "size", "mtime_ns", "glider", "segment", "reason", "crc")
+    why = row["hindrance"] if "hindrance" in row.keys() else ""  # noqa: SIM118 (a row is no mapping)
+    hindrance = Hindrance(why) if why else None
+    return File(status=Status(row["status"]), hindrance=hindrance, **{name: row[name] for name in names})
+
+
+def values(db: sqlite3.Connection, sql: str, arguments: tuple[object, ...], kind: type[R]) -> list[R]:
+    """The values in the first column of what a query finds. Raises DamagedError."""
+    return [plain_decode(row[0], kind) for row in db.execute(sql, arguments)]

@@ -5,7 +5,7 @@ given up (the channel refused it for good, or it cannot be read any more) or wit
 acknowledged its incident before it was due. ``error`` says why in words, for people.
 
 A row is held until ``held_until``, or until ``escalates`` while nobody has acknowledged its incident,
-whichever is first (`rules.waiting`); infinite is never. Within an incident and channel no row is held longer
+whichever is first (`incidents.send_schedule`); infinite is never. Within an incident and channel no row is held longer
 than a later one: what is urgent brings along what came before it.
 """
 
@@ -16,13 +16,13 @@ import sqlite3
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
-from gliderwatch.alerts.outbox import LONGEST_DELAY, Delivery, OutboxRow
+from gliderwatch.delivery.dispatcher import LONGEST_DELAY, Delivery, OutboxRow
 from gliderwatch.errors import DamagedError, LayoutError
+from gliderwatch.incidents.send_schedule import Due
 from gliderwatch.model import Alert
-from gliderwatch.rules.waiting import Due
 from gliderwatch.store import codec
+from gliderwatch.store.codec import Undelivered
 from gliderwatch.store.database import DELIVERY_BY_WORDS, connect
-from gliderwatch.store.rows import Undelivered
 
 PARKED = math.inf
 """`next_try` of rows whose channel is not in the configuration."""

@@ -14,11 +14,10 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 
+from gliderwatch.incidents.notifications import NotificationState, ended_at, is_removable, kept_since
 from gliderwatch.model import Incident, SegmentId
 from gliderwatch.navigation.clock import is_same
 from gliderwatch.pipeline import GliderState
-from gliderwatch.rules.announce import Said
-from gliderwatch.rules.retained import ended_at, is_removable, kept_since
 from gliderwatch.store import codec
 from gliderwatch.store.clocks import FIRST
 
@@ -77,9 +76,9 @@ def _incidents(db: sqlite3.Connection, glider: str) -> list[Incident]:
     return [codec.plain_decode(row[0], Incident) for row in rows]
 
 
-def _said(db: sqlite3.Connection, glider: str) -> Said:
+def _said(db: sqlite3.Connection, glider: str) -> NotificationState:
     row = db.execute("SELECT data FROM said WHERE glider = ?", (glider,)).fetchone()
-    return codec.plain_decode(row[0], Said) if row is not None else Said()
+    return codec.plain_decode(row[0], NotificationState) if row is not None else NotificationState()
 
 
 def _forget_incidents(db: sqlite3.Connection, glider: str, cut: float) -> tuple[float, set[str]]:

@@ -8,11 +8,53 @@ from dataclasses import replace
 
 from gliderwatch.model import Segment, SegmentId
 from gliderwatch.navigation.clock import SAME_OPENING, Correction, moved, numbered
-from gliderwatch.navigation.samples import compact
+from gliderwatch.navigation.samples import downsample
 from gliderwatch.pipeline import GliderState
 from gliderwatch.store import clocks, codec
-from gliderwatch.store.ahead import Ahead
 from gliderwatch.store.clocks import FIRST
+
+# ----------------------------------------
+# States of gliders that are ahead of their checkpoints: while a long list of files is taken in.
+
+
+class CheckpointCache:
+    """The newest state of each glider of which many files are at hand, in memory alone.
+
+    Of a long list most checkpoints would be thinned out before anyone goes on from them. So they are not
+    written; what is lost of them when the daemon ends is remade from the checkpoint before and the segments.
+    """
+
+    def __init__(self) -> None:
+        self._states: dict[str, tuple[SegmentId, GliderState]] = {}
+        self._unsure: set[str] = set()
+
+    def keep(self, identity: SegmentId, state: GliderState) -> None:
+        """Keep the state after a segment, the newest of its glider."""
+        self._states[identity.glider] = identity, state
+        self._unsure.add(identity.glider)
+
+    def before(self, first: SegmentId) -> tuple[SegmentId, GliderState] | None:
+        """The state kept of its glider, if it is of a segment before `first`."""
+        kept = self._states.get(first.glider)
+        return kept if kept is not None and kept[0] < first else None
+
+    def drop(self, glider: str) -> None:
+        """Know no state of a glider."""
+        self._states.pop(glider, None)
+
+    def commit(self) -> None:
+        """What was kept since the last time is in the state file."""
+        self._unsure.clear()
+
+    def rollback(self) -> None:
+        """It is not: forget it."""
+        for glider in self._unsure:
+            self.drop(glider)
+        self._unsure.clear()
+
+
+# ----------------------------------------
+# The segments of each glider in a state file, and the checkpoints after them.
 
 RECENT = 64
 """Newest segments of a glider that all keep their checkpoint."""
@@ -29,7 +71,7 @@ class Segments:
 
     def __init__(self, connection: sqlite3.Connection) -> None:
         self._db = connection
-        self.ahead, self.following = Ahead(), 0
+        self.ahead, self.following = CheckpointCache(), 0
 
     def completeness(self, identity: SegmentId) -> tuple[int, int, str] | None:
         """Of the copy of a segment that is held, None when there is none; by the glider's clock."""
@@ -58,7 +100,7 @@ class Segments:
         of which that is only now seen, get the ids that they have in the right time.
         What navigation would average anyway is kept as that: 4 s data would fill the state file.
         """
-        thinned = replace(segment, quantities=compact(segment.quantities))
+        thinned = replace(segment, quantities=downsample(segment.quantities))
         glider, name = segment.id.glider, segment.id.name
         old, touched, correction = self._held(segment.id), list[SegmentId](), Correction()
         if old is not None:

@@ -11,7 +11,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from gliderwatch.alerts.worker import Delivery
+from gliderwatch.delivery.dispatcher import Delivery
 from gliderwatch.store.database import guarded, read_only
 from gliderwatch.store.outbox import delivery, released
 

@@ -1,0 +1,3 @@
+"""Alerts on their way to people: channels, mail, and the dispatcher of the outbox."""
+
+from __future__ import annotations

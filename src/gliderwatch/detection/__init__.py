@@ -1,1 +1,0 @@
-"""Is the speed abnormal, and can the estimate be believed? Pure."""

@@ -1,0 +1,211 @@
+"""What is usual for a glider beside its speed: numbers that speak for or against a fault. Pure.
+
+Each number of a dive is held against the same number of healthy dives of this deployment at a like setting of
+the thruster: the first ones, and the latest. A pilot changes pitch and ballast, and with them how fast the
+glider dives and climbs: such an answer is held against dives at the same pitch and ballast only, of the
+first ones if they will do, because growth that slows a glider over weeks is not to be taken for usual.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import compress
+from math import isfinite
+from statistics import median
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gliderwatch.estimation.kinematic_speed import MAD_TO_SIGMA
+from gliderwatch.estimation.speed_range import LIKE
+from gliderwatch.model import Array, DiveFeatures, readonly
+from gliderwatch.navigation.features import evidence
+
+FIRST, RECENT = 12, 12
+"""Healthy dives kept of those at a like setting of the thruster: the first and the latest."""
+MOST = 144
+"""Dives kept of all settings: six settings' worth."""
+LEAST = 5
+"""Dives that tell what is usual."""
+SHORTEST, BRIEF = 3600.0, 1800.0
+"""s: a shorter dive teaches nothing, because after launch pilots try out the ballast; and one so short that
+its numbers are those of its turns is not compared."""
+WIDTH = 4.0
+"""Half width of a range in robust standard deviations."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A number of a dive, and what half of its range is at least: ``least`` in its unit and ``part`` of the
+    usual value. It depends on the numbers ``given``; empty: it is the pilot's choice, or nobody's."""
+
+    name: str
+    least: float = 0.0
+    part: float = 0.0
+    given: tuple[str, ...] = ()
+
+
+TRIM = ("pitch_dive", "pitch_climb", "ballast_dive", "ballast_climb")
+QUANTITIES = (
+    Quantity("roll_mean", least=0.08),
+    Quantity("pitch_dive", least=0.08),
+    Quantity("pitch_climb", least=0.08),
+    Quantity("pitch_asymmetry", least=0.1),
+    Quantity("depth_rate_dive", part=0.15, given=TRIM),
+    Quantity("depth_rate_climb", part=0.15, given=TRIM),
+    Quantity("rate_ratio", part=0.15, given=TRIM),
+    Quantity("ballast_dive", least=20e-6, part=0.15),
+    Quantity("ballast_climb", least=20e-6, part=0.15),
+    Quantity("yos_per_hour", part=0.3, given=(*TRIM, "depth_max")),
+    Quantity("duration_h", least=0.5, part=0.4),
+    Quantity("vacuum", least=4e3),
+)
+"""Names and units: `docs/nomenclature.md`."""
+_DEPTH = Quantity("depth_max", least=5.0, part=0.15)
+_BY_NAME = {q.name: q for q in (*QUANTITIES, _DEPTH)}
+_COLUMN = {name: i for i, name in enumerate((*_BY_NAME, "thruster"))}
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """Healthy dives of one deployment, oldest first.
+
+    ``dives`` ((k, n), k at most `MOST`) has a column for each of `QUANTITIES`, for the depth reached and for
+    the thruster; ``known`` (the same shape) is 1 where a dive tells, else 0.
+    """
+
+    dives: Array = field(default_factory=lambda: readonly(np.empty((0, len(_COLUMN)))))
+    known: Array = field(default_factory=lambda: readonly(np.empty((0, len(_COLUMN)))))
+
+
+@dataclass(frozen=True, slots=True)
+class Usual:
+    """The ``value`` of a number on one dive, what is ``usual``, and the range from ``low`` to ``high``."""
+
+    value: float
+    low: float
+    usual: float
+    high: float
+
+
+def learn(baseline: Baseline, features: DiveFeatures) -> Baseline:
+    """The baseline with one more dive. Only for dives that are healthy, and not while an incident is open.
+
+    A new deployment begins with ``Baseline()``.
+    """
+    if features.duration < SHORTEST:
+        return baseline
+    row = _row(features)
+    dives = np.concatenate([_dives(baseline), row[None]])
+    alike = np.flatnonzero(_same_setting(dives, row))
+    if len(alike) > FIRST + RECENT:
+        dives = np.delete(dives, alike[FIRST], axis=0)
+    dives = dives[-MOST:]
+    known = np.isfinite(dives)
+    return Baseline(readonly(np.where(known, dives, 0.0)), readonly(known))
+
+
+def compare(baseline: Baseline, features: DiveFeatures) -> dict[str, Usual]:
+    """The numbers of a dive of which enough healthy dives tell what is usual, by name."""
+    if features.duration < BRIEF:
+        return {}
+    row = _row(features)
+    dives = _dives(baseline)
+    dives = dives[_same_setting(dives, row)]
+    same = {given: _same_trim(dives, row, given) for given in {q.given for q in QUANTITIES}}
+    out = {}
+    for quantity, value, values in zip(QUANTITIES, row.tolist(), dives.T.tolist(), strict=False):
+        usual = _usual(values, same[quantity.given], quantity) if isfinite(value) else None
+        if usual is not None:
+            out[quantity.name] = Usual(value, *usual)
+    return out
+
+
+def told(baseline: Baseline, features: DiveFeatures) -> dict[str, float]:
+    """What a dive adds to its evidence: `derived` numbers, and what is usual.
+
+    ``_low``, ``_usual`` and ``_high`` are put after each name that `compare` knows; ``surfacing_delay_h``
+    is how much later than usual the dive ended (h).
+    """
+    out = derived(features)
+    for name, usual in compare(baseline, features).items():
+        out |= {f"{name}_low": usual.low, f"{name}_usual": usual.usual, f"{name}_high": usual.high}
+        if name == "duration_h":
+            out["surfacing_delay_h"] = usual.value - usual.usual
+    return out
+
+
+def derived(features: DiveFeatures) -> dict[str, float]:
+    """Numbers made of others.
+
+    ``pitch_asymmetry`` (rad) is by how much the climb is steeper than the dive, ``rate_ratio`` how fast the
+    glider climbs as a part of how fast it dives, ``yos_per_hour`` how often it turned to climb (1/h).
+
+    >>> derived(DiveFeatures(duration=10800.0, depth_rate_dive=0.2, depth_rate_climb=-0.1, yos=6))
+    {'rate_ratio': 0.5, 'yos_per_hour': 2.0}
+    """
+    out = {}
+    down, up = features.pitch_dive, features.pitch_climb
+    if down is not None and up is not None:
+        out["pitch_asymmetry"] = abs(up) - abs(down)
+    down, up = features.depth_rate_dive, features.depth_rate_climb
+    if down and up:
+        out["rate_ratio"] = abs(up / down)
+    if features.yos and features.duration:
+        out["yos_per_hour"] = features.yos / (features.duration / 3600)
+    return out
+
+
+def _dives(baseline: Baseline) -> Array:
+    """The dives with NaN where one does not tell."""
+    return np.where(baseline.known > 0, baseline.dives, np.nan)
+
+
+def _row(features: DiveFeatures) -> Array:
+    """The numbers of a dive in the order of columns, NaN where unknown; no word of a thruster: it was off.
+
+    They are compared as they are published, because what is usual is published beside them.
+    """
+    known = {"thruster": 0.0, **evidence(features), **derived(features)}
+    return np.array([known.get(name, np.nan) for name in _COLUMN], dtype=np.float64)
+
+
+def _same_setting(dives: Array, row: Array) -> NDArray[np.bool_]:
+    """Which dives were flown with the thruster like this one: buoyancy alone is like nothing else."""
+    at = _COLUMN["thruster"]
+    return np.asarray((np.abs(dives[:, at] - row[at]) < LIKE) & ((dives[:, at] > 0) == (row[at] > 0)))
+
+
+def _usual(values: list[float], same: list[bool], quantity: Quantity) -> tuple[float, float, float] | None:
+    """Low, usual and high value of a number among dives, None where too few tell.
+
+    ``values`` of each dive, NaN where it does not tell; ``same``: whether it was at the same trim.
+    """
+    known = [value for value in values if isfinite(value)]
+    windows = [known[:FIRST], known[-RECENT:]]
+    if quantity.given:
+        alike = [each for value, each in zip(values, same, strict=True) if isfinite(value)]
+        first = list(compress(known[:FIRST], alike))
+        # the first dives alone, so that what grows slowly is not usual in the end
+        windows = [first if len(first) >= LEAST else list(compress(known, alike))]
+    if len(windows[-1]) < LEAST:
+        return None
+    ranges = [_range(values, quantity) for values in windows]
+    return min(low for low, _, _ in ranges), ranges[-1][1], max(high for _, _, high in ranges)
+
+
+def _same_trim(dives: Array, row: Array, given: tuple[str, ...]) -> list[bool]:
+    """Whether each dive had the same of what a number depends on, as far as both tell."""
+    same = np.ones(len(dives), dtype=bool)
+    for name in given:
+        quantity, column = _BY_NAME[name], _COLUMN[name]
+        apart = np.abs(dives[:, column] - row[column])
+        same &= ~(apart > max(quantity.least, quantity.part * abs(row[column])))
+    return same.tolist()
+
+
+def _range(values: list[float], quantity: Quantity) -> tuple[float, float, float]:
+    usual = median(values)  # of a dozen values: numpy's is for thousands
+    spread = WIDTH * MAD_TO_SIGMA * median([abs(value - usual) for value in values])
+    half = max(spread, quantity.least, quantity.part * abs(usual))
+    return usual - half, usual, usual + half

@@ -1,0 +1,219 @@
+"""Evidence over several dives: steps in speed that the glider does not know of, and slow drifts. Pure."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cache
+
+import numpy as np
+
+from gliderwatch.estimation.dive_measurement import SIDE, SLIP
+from gliderwatch.model import Array, readonly
+from gliderwatch.sea.gauss_markov import LASTING
+
+# ----------------------------------------
+# Evidence over several dives. Pure.
+#
+# Two tests. `Bank` is the generalised likelihood ratio of Willsky and Jones (1976): after each dive it asks
+# of every recent dive whether a step in the state of a Kalman filter, begun just before that dive, explains
+# the innovations since. `cusum` is Page's (1954): it adds up small departures of one number in one
+# direction. Both are set by how often they may cry wolf.
+
+WINDOW = 24
+"""Dives that a step may lie back, some three days: by then the flow has forgotten what it was before."""
+CALIBRATED = (0.5, 10.0, 4.0)
+"""Alarms a healthy glider gives in a month at a ratio, that ratio, and by how much it must rise for a factor
+e fewer. Fitted to what `python benchmarks/joint.py calibrate` printed (74 glider-months, seven kinds of sea):
+
+    ratio above     8     10    12    14    16    18    20    24
+    alarms a month  .89   .43   .30   .20   .11   .068  .027  .014
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Bank:
+    """Hypotheses of a step, one for each recent dive, oldest first.
+
+    ``shift`` ((k, n, q)): by how much the state differs from what the filter makes of it, for each of the q
+    numbers that describe a step; ``info`` ((k, q, q)) and ``score`` ((k, q)): information about these
+    numbers in the innovations since, and the gradient of the log likelihood in them.
+    """
+
+    shift: Array = field(default_factory=lambda: readonly(np.empty((0, 0, 0))))
+    info: Array = field(default_factory=lambda: readonly(np.empty((0, 0, 0))))
+    score: Array = field(default_factory=lambda: readonly(np.empty((0, 0))))
+
+
+@dataclass(frozen=True, slots=True)
+class Update:
+    """One update of a Kalman filter with n states and m measurements.
+
+    ``rows`` ((m, n)), ``gain`` ((n, m)), and ``weight`` ((m, m)), the inverse covariance of the
+    ``innovation`` ((m,)).
+    """
+
+    rows: Array
+    gain: Array
+    weight: Array
+    innovation: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """The likeliest step.
+
+    ``ratio`` is twice the log likelihood ratio: where there was no step, of chi-square with one degree of
+    freedom at each dive. ``which`` number and ``sigma`` of the step; ``dives`` since it (1: before the
+    last one); ``shifts``, ``info`` and ``score``: the hypothesis, as in the `Bank`.
+    """
+
+    ratio: float
+    which: int
+    sigma: float
+    dives: int
+    shifts: Array
+    info: Array
+    score: Array
+
+    @property
+    def size(self) -> float:
+        """Size of the step."""
+        return float((np.linalg.inv(self.info) @ self.score)[self.which])
+
+    @property
+    def shift(self) -> Array:
+        """By how much the state is off by all of it, (n,)."""
+        return np.asarray(self.shifts @ (np.linalg.inv(self.info) @ self.score))
+
+    @property
+    def cov(self) -> Array:
+        """Covariance of `shift`, (n, n)."""
+        shifted = self.shifts @ np.linalg.inv(self.info) @ self.shifts.T
+        return np.asarray((shifted + shifted.T) / 2)
+
+
+def advance(bank: Bank, shape: Array, precision: Array, kept: Array, update: Update) -> Bank:
+    """The bank after one more dive.
+
+    ``shape`` ((n, q)) is what a step does to the state, ``precision`` ((q, q)) what is known of its size
+    before, ``kept`` ((n,)) the diagonal transition to the dive.
+    """
+    n, q = shape.shape
+    old = 1 - WINDOW
+    shift = np.concatenate([bank.shift.reshape(-1, n, q)[old:] * kept[:, None], shape[None]])
+    info = np.concatenate([bank.info.reshape(-1, q, q)[old:], precision[None]])
+    score = np.concatenate([bank.score.reshape(-1, q)[old:], np.zeros((1, q))])
+    seen = update.rows @ shift
+    weighted = np.swapaxes(seen, 1, 2) @ update.weight
+    return Bank(
+        readonly(shift - update.gain @ seen),
+        readonly(info + weighted @ seen),
+        readonly(score + weighted @ update.innovation),
+    )
+
+
+def likeliest(bank: Bank, which: int, sign: int = 0) -> Step | None:
+    """The likeliest step in number ``which``: of any ``sign`` (0), or of one. None while there are no dives.
+
+    The other numbers take what values they like within the precision given to `advance`.
+    """
+    if not len(bank.score):
+        return None
+    rest = [i for i in range(bank.score.shape[1]) if i != which]
+    cross = bank.info[:, [which]][:, :, rest]
+    used = cross @ np.linalg.inv(bank.info[:, rest][:, :, rest])
+    info = bank.info[:, which, which] - (used @ np.swapaxes(cross, 1, 2))[:, 0, 0]
+    score = bank.score[:, which] - (used @ bank.score[:, rest, None])[:, 0, 0]
+    ratio = np.where(score * sign >= 0, score**2 / info, 0.0)
+    k = int(ratio.argmax())
+    return Step(
+        ratio=float(ratio[k]),
+        which=which,
+        sigma=float(info[k]) ** -0.5,
+        dives=len(ratio) - k,
+        shifts=bank.shift[k],
+        info=bank.info[k],
+        score=bank.score[k],
+    )
+
+
+def ratio_bound(alarms_per_month: float) -> float:
+    """The ratio of `Step` that a healthy glider reaches so often in a month. Raises ValueError below 0.
+
+    By measurement, not by theory: the flow is not quite what the filter takes it for, which makes
+    large ratios more frequent than chi-square has them.
+
+    >>> ratio_bound(0.5), round(ratio_bound(0.05), 1)
+    (10.0, 19.2)
+    """
+    if not alarms_per_month > 0:
+        raise ValueError(f"alarms a month must be above 0, not {alarms_per_month}")
+    most, ratio, fall = CALIBRATED
+    return ratio + fall * math.log(most / min(alarms_per_month, most))
+
+
+def cusum(before: float, departure: float, slack: float) -> float:
+    """Page's sum after one more number: ``departure`` in standard deviations, of which ``slack`` is normal.
+
+    >>> cusum(1.0, 2.0, 0.5)
+    2.5
+    """
+    return max(0.0, before + departure - slack)
+
+
+@cache
+def cusum_bound(slack: float, dives_between_alarms: float) -> float:
+    """The sum that a healthy glider reaches once in so many dives, departures being white and normal.
+
+    Siegmund's (1985) approximation of the mean run length, (exp(2 k b) - 2 k b - 1) / (2 k^2) with b the
+    bound plus 1.166, solved by bisection. Raises ValueError when slack or dives are not positive.
+
+    >>> round(cusum_bound(0.5, 336.0), 2)  # exact: 4
+    3.99
+    """
+    if not (slack > 0 and dives_between_alarms > 0):
+        raise ValueError(f"slack and dives must be above 0, not {slack} and {dives_between_alarms}")
+    low, high = 0.0, 20.0 / slack
+    for _ in range(50):
+        bound = (low + high) / 2
+        x = 2 * slack * (bound + 1.166)
+        low, high = (
+            (low, bound) if (math.expm1(x) - x) / (2 * slack**2) >= dives_between_alarms else (bound, high)
+        )
+    return high
+
+
+# ----------------------------------------
+# Losses that the glider does not know of: steps in slip (a lost or bent wing) and side (a compass).
+
+LARGEST = 0.5
+"""Usual size of a step in slip or side (parts of W)."""
+MOST = 4.0
+"""Standard errors: an innovation that is longer counts as this long."""
+
+
+def steps(
+    bank: Bank, kept: Array, update: Update, sea: float, front: float
+) -> tuple[Step | None, Step | None, Bank]:
+    """The likeliest loss (a step up in slip) and turn (one in side), and the bank with one more dive.
+
+    ``kept`` ((n,)) is the transition to the dive and ``update`` that of the filter. The flow may have changed
+    together with the step: by ``front`` (m/s, a component) in a usual sea, more where ``sea`` is above 1.
+    No dive alone may prove a step.
+    """
+    n = len(kept)
+    shape = np.zeros((n, 4))
+    shape[[n + SLIP, n + SIDE], [0, 1]] = 1.0
+    shape[[LASTING.start, LASTING.start + 1], [2, 3]] = 1.0
+    sizes = np.array([LARGEST, LARGEST, front, front])
+    square = float(update.innovation @ update.weight @ update.innovation)
+    believed = update.innovation * min(1.0, MOST / math.sqrt(max(square, 1e-12)))
+    bank = advance(bank, shape, np.diag(sizes**-2), kept, replace(update, innovation=believed))
+    return likeliest(bank, 0, sign=1), likeliest(bank, 1), bank
+
+
+def told(loss: Step | None, turn: Step | None, alarms_per_month: float) -> Step | None:
+    """The step that is too likely for chance, if there is one."""
+    bound = ratio_bound(alarms_per_month)
+    return next((step for step in (loss, turn) if step is not None and step.ratio > bound), None)

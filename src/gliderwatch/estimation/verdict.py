@@ -1,0 +1,339 @@
+"""What is normal for a glider, and what a dive says of it: the joint estimator with its tests. Pure."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from math import degrees, inf
+from statistics import median
+
+import numpy as np
+
+from gliderwatch.estimation import kalman
+from gliderwatch.estimation.dive_measurement import USUAL_PITCH, are_apart, slip_at
+from gliderwatch.estimation.kalman import JointInfo, JointParams, JointState
+from gliderwatch.estimation.kinematic_speed import KinematicSpeed, Ratios, kinematic_speed
+from gliderwatch.estimation.kinematic_speed import learn as learn_ratios
+from gliderwatch.estimation.modes import Cause
+from gliderwatch.estimation.speed_range import Normal, RangeParams, SpeedRange, learn, setting, speed_range
+from gliderwatch.estimation.step_test import cusum, cusum_bound
+from gliderwatch.model import Array, Dive, Flag
+
+# ----------------------------------------
+# Do the fixes, the compass and the current of a dive agree, and who is wrong if they do not? Pure.
+#
+# Ground velocity minus current is the way that the glider believes to have made through the water: along its
+# heading, at any speed. What is left across the heading has no other cause than a measurement that is
+# wrong: the current, the fixes, or the headings (compass, declination). A current that is wrong on many dives
+# alike stays where it is when the glider turns; a heading that is wrong turns with it.
+
+KEPT = 8
+"""Dives back over which a current is told from a compass."""
+CLEARLY = 6.0
+"""By how much the chi-square of one explanation has to be below that of the other."""
+TURNED = math.radians(45)
+"""By how much the glider must have turned before the two can differ."""
+
+
+class Blame(StrEnum):
+    """What is wrong."""
+
+    CURRENT = "the current is wrong"
+    COMPASS = "the compass or the declination is wrong"
+    UNCLEAR = "the current or the compass is wrong, it cannot be told which"
+
+
+@dataclass(frozen=True, slots=True)
+class Misfit:
+    """One dive: ``rest`` is ground velocity minus current (m/s, (2,): east, north), ``along`` its part
+    along the heading, ``across`` that across it, left positive, with its standard error ``sigma`` (m/s);
+    ``heading`` (rad, counter-clockwise from east) the direction of the mean heading vector."""
+
+    along: float
+    across: float
+    sigma: float
+    heading: float
+
+    @property
+    def ratio(self) -> float:
+        """The part across in standard errors."""
+        return self.across / self.sigma
+
+
+def misfit(rest: Array, heading: Array, across: tuple[float, float]) -> Misfit:
+    """The misfit of a dive: ``rest`` (m/s, (2,)) and mean ``heading`` vector ((2,)), east and north."""
+    length = math.hypot(*heading)
+    return Misfit(
+        along=float(rest @ heading) / length,
+        across=across[0],
+        sigma=across[1],
+        heading=math.atan2(heading[1], heading[0]),
+    )
+
+
+def disagrees(each: Misfit, gate: float, least: float) -> bool:
+    """Whether what is across is more than ``gate`` standard errors, and more than ``least`` (m/s).
+
+    >>> disagrees(Misfit(along=0.3, across=0.1, sigma=0.01, heading=0.0), gate=4.0, least=0.05)
+    True
+    """
+    return abs(each.across) > max(gate * each.sigma, least)
+
+
+def blame(history: tuple[Misfit, ...], gate: float, least: float) -> Blame:
+    """Who is wrong on the last of some dives, oldest first; the last one `disagrees`.
+
+    A current is wrong on single dives; a compass that was right before and is right after would be strange.
+    Dives in a row that disagree are held against both explanations.
+    """
+    row = []
+    for each in reversed(history):
+        if not disagrees(each, gate, least):
+            break
+        row.append(each)
+    if len(row) < 2:
+        return Blame.CURRENT if len(history) > 1 else Blame.UNCLEAR
+    angles = np.array([each.heading for each in row])
+    if np.abs(np.angle(np.exp(1j * (angles[:, None] - angles)))).max() < TURNED:
+        return Blame.UNCLEAR
+    turned, shifted = _chi_squares(row, angles)
+    if shifted + 2 < turned - CLEARLY:
+        return Blame.CURRENT
+    return Blame.COMPASS if turned < shifted + 2 - CLEARLY else Blame.UNCLEAR
+
+
+def _chi_squares(row: list[Misfit], angles: Array) -> tuple[float, float]:
+    """What is left of the misfits by one turn of all headings (a number), and by one error of all currents
+    (two numbers): sums of squares in standard errors."""
+    across, sigma = np.array([each.across for each in row]), np.array([each.sigma for each in row])
+    along = np.array([[each.along] for each in row])
+    aside = np.column_stack([-np.sin(angles), np.cos(angles)])
+    return _left(along, across, sigma), _left(aside, across, sigma)
+
+
+def _left(shape: Array, across: Array, sigma: Array) -> float:
+    scaled = shape / sigma[:, None]
+    fitted = scaled @ np.linalg.lstsq(scaled, across / sigma)[0]
+    return float(np.sum((across / sigma - fitted) ** 2))
+
+
+# ----------------------------------------
+# What is normal for a glider, and what a dive says of it: the joint estimator with its tests. Pure.
+#
+# Flag 2: a measurement is wrong. Flag 1: the glider is slower than normal (or faster than configured), at
+# once or by evidence over several dives. No flag: its speed cannot be known from this dive, and why.
+
+DIVES_A_MONTH = 240.0
+"""Dives of 3 h in 30 days."""
+DEPARTURE, SLACK = 0.08, 1.0
+"""Part of the usual speed by which a healthy glider's speed varies at least, for the sum of small losses;
+and how many times that does not add to the sum."""
+OWN_SURE = 0.15
+"""Standard error of W on a dive, as part of it, up to which the dive tells what W is to what is reported."""
+NOT_FLOWN = "the way does not fit the commanded heading, and the measured one is not in the file"
+ROLLED, ROLLS = 0.12, 5
+"""rad: a step of the mean roll that speaks for a lost or bent wing; dives that tell the usual roll, and
+samples that tell the roll of a dive."""
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedParams:
+    """How speed is judged.
+
+    ``low`` and ``high`` (m/s) are the configured normal range; ``learning`` how another is learnt that takes
+    its place (None: not at all). ``confidence`` is by how many standard errors a speed must be outside;
+    ``gate`` (standard errors) and ``least`` (m/s) are of the test across the heading; ``vague`` is the
+    standard error, as part of the usual speed, above which a dive says nothing; ``turned`` (rad) the
+    least error of a compass that is told.
+    """
+
+    joint: JointParams = JointParams()
+    low: float = 0.15
+    high: float = 0.75
+    learning: RangeParams | None = RangeParams()
+    confidence: float = 1.645
+    gate: float = 4.0
+    least: float = 0.05
+    vague: float = 0.3
+    turned: float = 0.15
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedState:
+    """What is known after a dive.
+
+    ``joint`` estimate (None: no dive yet), ``normal`` speeds learnt, ``rolls`` (rad) of the first healthy
+    dives, ``rolled`` dives in a row that roll otherwise, ``slow`` Page's sum of small losses, ``doubted``
+    slow dives in a row that were not believed, ``misfits`` of the last dives, ``ratios`` of the speed to
+    what the glider tells of it.
+    """
+
+    joint: JointState | None = None
+    normal: Normal = Normal()
+    rolls: tuple[float, ...] = ()
+    rolled: int = 0
+    slow: float = 0.0
+    doubted: int = 0
+    misfits: tuple[Misfit, ...] = ()
+    ratios: Ratios = Ratios()
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What a dive says: ``flag`` (None: nothing) with the ``reason`` in words, the ``normal`` range used, and
+    what was found (``info``, None: the dive has no track)."""
+
+    flag: Flag | None
+    reason: str
+    normal: SpeedRange
+    info: JointInfo | None
+
+
+def step(
+    state: SpeedState, dive: Dive, params: SpeedParams, frozen: bool = False
+) -> tuple[SpeedState, Verdict]:
+    """The state after one more dive, and the verdict on it.
+
+    ``frozen``: an incident is open, so that nothing is learnt of what is normal.
+    """
+    if state.joint is not None and state.joint.end is not None and dive.start is not None:
+        state = SpeedState() if are_apart(state.joint.end, dive.start) else state
+    at = setting(dive.features)
+    learnt = speed_range(state.normal, at, params.learning) if params.learning else None
+    normal = learnt or SpeedRange(params.low, (params.low + params.high) / 2, params.high, 0)
+    rolled = state.rolled + 1 if _rolls(state, dive) else 0
+    usual = learnt.usual if learnt else None
+    # the first of two dives may have been half over when it happened
+    told = kinematic_speed(state.ratios, dive.features)
+    estimate, info = kalman.step(state.joint, dive, params.joint, usual, hint=1 <= rolled <= 2, tells=told)
+    if info is None:
+        flag, reason = _of_reckoning_alone(state, dive, told, normal, params)
+        return state, Verdict(flag, reason, normal, None)
+    state = replace(state, joint=estimate, rolled=rolled, misfits=_misfits(state, info))
+    flag, reason = _wrong(state, info, params)
+    if flag is not None and info.cause is not Cause.CURRENT and dive.features.heading_commanded:
+        flag, reason = None, NOT_FLOWN  # nothing is wrong that is measured
+    if flag is None and not reason:
+        state, flag, reason = _slow_or_fast(state, info, told, normal, params)
+    if flag is Flag.NORMAL and not frozen:
+        state = _learnt(state, dive, info, at, params)
+    return state, Verdict(flag, reason, normal, info)
+
+
+def _misfits(state: SpeedState, info: JointInfo) -> tuple[Misfit, ...]:
+    """The misfits of the last dives with that of one more."""
+    rest = info.seen.rest
+    if rest is None or info.across is None:
+        return state.misfits
+    return (*state.misfits, misfit(rest, info.seen.heading, info.across))[-KEPT:]
+
+
+def _wrong(state: SpeedState, info: JointInfo, params: SpeedParams) -> tuple[Flag | None, str]:
+    """Flag 2 where a measurement is wrong; no flag with a reason where the dive says nothing of the speed."""
+    if info.seen.current is None and not info.believes:
+        return None, "no depth-averaged current"
+    if info.across is not None and disagrees(state.misfits[-1], params.gate, params.least):
+        return Flag.FALSE_ALARM, str(blame(state.misfits, params.gate, params.least))
+    if info.cause is Cause.CURRENT:
+        return Flag.FALSE_ALARM, "the current does not fit those before, the ground velocity does"
+    if info.cause is Cause.GROUND:
+        return (
+            Flag.FALSE_ALARM,
+            "the ground velocity does not fit, the current does: fixes or headings are wrong",
+        )
+    side, sigma = info.estimate.side
+    if abs(side) > max(params.turned, 3 * sigma):
+        return Flag.FALSE_ALARM, f"the compass seems to be off by {degrees(abs(side)):.0f} degrees"
+    return None, ""
+
+
+def _of_reckoning_alone(
+    state: SpeedState, dive: Dive, told: KinematicSpeed | None, normal: SpeedRange, params: SpeedParams
+) -> tuple[Flag | None, str]:
+    """Flag 1 where a dive without track is slow by what the glider tells at once; else its reason."""
+    if told is None or not told.is_prompt or state.joint is None or not normal.dives:
+        return None, dive.reason
+    # no course that was steered can look like this: the bound is wide because nothing else confirms it
+    if (told.speed + 2 * params.confidence * told.sigma) * (1 - _usual_slip(params)) < normal.low:
+        return Flag.ANOMALY, f"slower than normal by depth rate and pitch alone ({dive.reason})"
+    return None, dive.reason
+
+
+def _slow_or_fast(
+    state: SpeedState, info: JointInfo, told: KinematicSpeed | None, normal: SpeedRange, params: SpeedParams
+) -> tuple[SpeedState, Flag | None, str]:
+    """The flag that the speed gives, and the state with the sum of small losses and the doubts."""
+    believed = told if info.believes else None
+    sigma_own = min(info.single_sigma, believed.sigma if believed is not None else inf)
+    if sigma_own > params.vague * normal.usual:
+        return state, None, "the speed cannot be known: the glider turned too much"
+    # what is common to all dives is also in a range that was learnt from them
+    sigma = params.confidence * (info.estimate.own_sigma if normal.dives else info.estimate.sigma)
+    if info.estimate.speed + sigma < normal.low:
+        if not state.doubted and believed is None and _may_have_turned(info, normal):
+            reason = "slow, or it turned while its heading was not seen: the next dive will tell"
+            return replace(state, doubted=1), None, reason
+        return state, Flag.ANOMALY, _how_slow(info, normal, params)
+    state = replace(state, doubted=0)
+    if info.estimate.speed - sigma > normal.high:
+        if normal.dives:
+            return state, Flag.FALSE_ALARM, "faster than ever: the current is wrong, or it is driven harder"
+        return state, Flag.ANOMALY, "faster than normal"
+    return _small_losses(state, info, normal, params)
+
+
+def _usual_slip(params: SpeedParams) -> float:
+    """The part of W that a usual angle of attack takes."""
+    return params.joint.slip * slip_at(USUAL_PITCH)
+
+
+def _may_have_turned(info: JointInfo, normal: SpeedRange) -> bool:
+    """Whether a turn back while no heading was seen explains a slow dive as well."""
+    seen = 1 - 2 * info.seen.unseen
+    return seen <= 0 or info.estimate.speed / seen >= normal.low
+
+
+def _small_losses(
+    state: SpeedState, info: JointInfo, normal: SpeedRange, params: SpeedParams
+) -> tuple[SpeedState, Flag, str]:
+    """Flag 1 where a loss too small for one dive has gone on for several; the state with the sum of it."""
+    if not normal.dives:
+        return state, Flag.NORMAL, ""
+    bound = cusum_bound(SLACK, DIVES_A_MONTH / params.joint.alarms_per_month)
+    total = cusum(state.slow, (1 - info.estimate.speed / normal.usual) / DEPARTURE, SLACK)
+    state = replace(state, slow=min(total, 2 * bound))
+    if total > bound:
+        return state, Flag.ANOMALY, "a little slow for several dives"
+    return state, Flag.NORMAL, ""
+
+
+def _how_slow(info: JointInfo, normal: SpeedRange, params: SpeedParams) -> str:
+    """Words for a speed below normal."""
+    believed = info.estimate.own_speed * (1 - params.joint.slip * info.seen.slip)
+    if believed >= normal.low:
+        return "slower through the water than the glider itself believes: a wing may be lost or bent"
+    return "slower than normal"
+
+
+def _rolls(state: SpeedState, dive: Dive) -> bool:
+    """Whether the roll of a dive differs much from the usual one."""
+    roll = dive.features.roll_mean
+    if roll is None or dive.n_samples < ROLLS or len(state.rolls) < ROLLS:
+        return False
+    return abs(roll - median(state.rolls)) > ROLLED
+
+
+def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: SpeedParams) -> SpeedState:
+    """The state with what a normal dive teaches."""
+    roll = dive.features.roll_mean
+    if roll is not None and len(state.rolls) < 3 * ROLLS:
+        state = replace(state, rolls=(*state.rolls, roll))
+    own = info.seen.own_speed()
+    if own is not None and own[1] < OWN_SURE * own[0]:
+        state = replace(state, ratios=learn_ratios(state.ratios, dive.features, own[0]))
+    if params.learning is None or info.told is not None:
+        return state
+    before = state.joint.dives - 1 if state.joint else 0
+    normal = learn(state.normal, info.estimate.speed, at, dive.features.duration, params.learning, before)
+    return replace(state, normal=normal)

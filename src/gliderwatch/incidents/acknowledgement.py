@@ -1,0 +1,70 @@
+"""When somebody has acknowledged an incident, or muted a glider: what is brought to mind no more. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from gliderwatch.incidents.state_machine import departure, is_severe
+from gliderwatch.model import Incident, Kind, Severity
+from gliderwatch.params import Attention
+
+# ----------------------------------------
+# When somebody has taken an incident on: it is brought to mind no more, until it grows worse.
+
+MARGINS = {Kind.ANOMALY: 0.05, Kind.FALSE_ALARM: 0.1}
+"""How much further out of the ordinary than when it was acknowledged counts as worse: m/s out of the normal
+range, or flow error p_E."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ack:
+    """Who took an incident on, when (``at``, s), with what ``note``, and how bad it was then.
+
+    ``departure`` is that of its worst dive (`rules.incident.departure`), ``severe`` whether that was severe.
+    """
+
+    incident: str
+    by: str
+    note: str
+    at: float
+    severity: Severity
+    departure: float
+    severe: bool
+
+    def holds(self, incident: Incident) -> bool:
+        """Whether the incident has not grown worse since."""
+        return (
+            incident.severity <= self.severity
+            and is_severe(incident.worst) <= self.severe
+            and departure(incident.worst, incident.kind) - self.departure <= MARGINS.get(incident.kind, 0.0)
+        )
+
+
+Acks = Mapping[str, Ack]
+"""Acknowledgements by the id of their incident."""
+
+
+def acknowledge(incident: Incident, by: str, note: str, at: float) -> Ack:
+    """The acknowledgement of an incident as it is at a time (s)."""
+    worst = incident.worst
+    return Ack(
+        incident.id, by, note, at, incident.severity, departure(worst, incident.kind), is_severe(worst)
+    )
+
+
+# ----------------------------------------
+# A glider that is muted in the configuration, by a command, or both.
+
+
+def with_mute(configured: Attention, until: float | None) -> Attention:
+    """How a glider is taken that a command mutes until a time (s; None: it does not): the later mute counts.
+
+    >>> with_mute(Attention(muted_until=5.0), 9.0).muted_until
+    9.0
+    >>> with_mute(Attention(muted_until=9.0), 5.0).muted_until
+    9.0
+    """
+    if until is None or (configured.muted_until is not None and configured.muted_until >= until):
+        return configured
+    return replace(configured, muted_until=until)

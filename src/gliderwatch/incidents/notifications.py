@@ -1,0 +1,311 @@
+"""What people were notified of, compared with what is so: the messages that are due. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Protocol
+
+from gliderwatch.incidents.acknowledgement import Acks
+from gliderwatch.incidents.overdue import Silence
+from gliderwatch.incidents.unjudged import Unknown
+from gliderwatch.messages import incident_text
+from gliderwatch.model import Alert, Assessment, Incident, NextSurfacing
+
+# ----------------------------------------
+# What people have been told, compared with what is known: the messages that are due. Pure.
+#
+# Incidents are remade from the data whenever late data come; what was said stays said. So messages are never
+# a by-product of a change: they are the difference between the two, found anew after every input. Nothing
+# is said twice, and nothing that changed stays unsaid.
+
+NEWS = 86400.0
+"""Seconds: an incident that was over for longer when it became known is history, not news."""
+SPEED_CHANGE = 0.05
+"""m/s: a smaller change of a speed that was told is not worth a correction."""
+FLOW_CHANGE = 0.05
+"""m/s: the same for the reference flow."""
+NO_ACKS: Acks = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class Thread:
+    """The messages of one incident: the incident and the dive as last ``told``, how many messages so far, and
+    the latest surfacing (s) that was known at the last one."""
+
+    id: str
+    told: Incident
+    dive: Assessment
+    messages: int
+    time: float
+    withdrawn: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class NotificationState:
+    """What people have been told of one glider.
+
+    ``surfaced`` is the surfacing of the last notice (s), ``silences`` what was told of its staying away
+    (`incidents.overdue`), ``unknown`` of dives that could not be judged (`incidents.unjudged`), ``irregularities``
+    the ids of those of its files.
+    """
+
+    threads: tuple[Thread, ...] = ()
+    surfaced: float | None = None
+    silences: tuple[Silence, ...] = ()
+    unknown: Unknown | None = None
+    irregularities: tuple[str, ...] = ()
+
+
+class IncidentFacts(Protocol):
+    """What is known of one glider now; the store answers."""
+
+    def incidents(self) -> tuple[Incident, ...]:
+        """All its incidents."""
+
+    def dive(self, t_dive: float) -> Assessment | None:
+        """The dive that began at a time (s)."""
+
+    def expected(self, until: float) -> NextSurfacing | None:
+        """What was expected after the last surfacing at `until` (s) or before."""
+
+    def last_surfacing(self, until: float) -> Assessment | None:
+        """The last dive that has ended with a fix and surfaced at `until` (s) or before."""
+
+
+def due_notifications(
+    said: NotificationState,
+    known: IncidentFacts,
+    reminder_hours: float | None,
+    notices: bool,
+    acks: Acks = NO_ACKS,
+) -> tuple[NotificationState, list[Alert]]:
+    """The messages to send now, and what will have been said then.
+
+    `notices`: whether anyone wants a notice of each surfacing. An incident that somebody has acknowledged
+    (`acks`) is not brought to mind, unless it has grown worse since.
+    """
+    latest = known.last_surfacing(float("inf"))
+    if latest is None:
+        return said, []
+    threads: list[Thread] = []
+    alerts: list[Alert] = []
+    incidents = known.incidents()
+    matched = _matched(said.threads, incidents)
+    for before in said.threads:
+        now = matched.get(before.id)
+        hours = None if now is not None and _is_acknowledged(before, now, acks) else reminder_hours
+        thread, more = _continued(before, now, known, latest, hours)
+        threads.append(thread)
+        alerts += more
+    old = {i.id for i in matched.values()}
+    for incident in sorted(incidents, key=lambda i: (i.opened_at, i.id)):
+        if incident.id not in old and _is_news(incident, latest):
+            thread, more = _begun(incident, known, latest, {t.id for t in threads})
+            threads.append(thread)
+            alerts += more
+    surfaced = said.surfaced
+    if notices and _is_another(latest, surfaced):
+        identity = f"{latest.glider}/surfacing/{latest.t_dive:.0f}"
+        before_it = known.last_surfacing(latest.t_surface - 1.0)
+        previous = before_it.t_surface if before_it is not None else None
+        expected = known.expected(float("inf"))
+        if expected is not None and expected.after < latest.t_surface:
+            expected = None  # of an earlier surfacing: the last dive cannot be used
+        alerts.append(incident_text.surfacing(latest, previous, alert_id=identity, expected=expected))
+        surfaced = latest.t_surface
+    said = replace(said, threads=tuple(threads), surfaced=surfaced)
+    return said, sorted(alerts, key=lambda a: a.time)
+
+
+def unacknowledged(said: NotificationState, incidents: tuple[Incident, ...], acks: Acks) -> frozenset[str]:
+    """The threads of what goes on and nobody has taken on: incidents, and gliders that stay away or cannot
+    be judged."""
+    matched = _matched(said.threads, incidents)
+    threads = {
+        thread.id
+        for thread in said.threads
+        if (now := matched.get(thread.id)) is not None
+        and now.cleared_at is None
+        and not _is_acknowledged(thread, now, acks)
+    }
+    if said.unknown is not None and not said.unknown.is_over:
+        threads.add(said.unknown.id)
+    return frozenset(threads | {silence.id for silence in said.silences if silence.called is None})
+
+
+def as_notified(said: NotificationState, known: IncidentFacts) -> NotificationState:
+    """What was said, as of what is known after all was assessed anew by other code or parameters.
+
+    Nobody is told old things anew: no corrections of what is over, nor of details. What is left to `due` is
+    what matters now: an incident that is open and was not told, or was told to be open and is not.
+    """
+    latest, incidents = known.last_surfacing(float("inf")), known.incidents()
+    if latest is None:
+        return said
+    matched, threads = _matched(said.threads, incidents), list[Thread]()
+    for thread in said.threads:
+        now = matched.get(thread.id)
+        was_open = thread.told.cleared_at is None and not thread.withdrawn
+        if was_open != (now is not None and now.cleared_at is None):
+            threads.append(thread)
+        elif now is None:
+            threads.append(replace(thread, withdrawn=True))
+        else:
+            dive = known.dive(thread.dive.t_dive) or known.last_surfacing(thread.dive.t_surface) or now.last
+            threads.append(replace(thread, told=now, dive=dive, withdrawn=False))
+    old = {i.id for i in matched.values()} | {t.id for t in threads}
+    for i in incidents:
+        if i.id not in old and i.cleared_at is not None and _is_news(i, latest):
+            threads.append(Thread(i.id, i, i.last, 0, latest.t_surface))
+    return replace(said, threads=tuple(threads))
+
+
+def _is_acknowledged(thread: Thread, now: Incident, acks: Acks) -> bool:
+    """Whether somebody has taken an incident on, as bad as it is; late data may have changed its id."""
+    ack = acks.get(now.id) or acks.get(thread.id)
+    return ack is not None and ack.holds(now)
+
+
+def _is_another(dive: Assessment, surfaced: float | None) -> bool:
+    """Whether a dive ended with a later surfacing than the one that was told, whose time data that came
+    late may have moved."""
+    return surfaced is None or (dive.t_dive + dive.t_surface) / 2 > surfaced
+
+
+def _matched(threads: Iterable[Thread], incidents: tuple[Incident, ...]) -> dict[str, Incident]:
+    """For each thread the incident that it is about now: the one told, else one of its kind and time."""
+    by_id = {i.id: i for i in incidents}
+    out = {t.id: by_id[t.told.id] for t in threads if t.told.id in by_id}
+    free = [i for i in incidents if i not in out.values()]
+    for thread in threads:
+        if thread.id not in out:
+            near = [i for i in free if i.kind == thread.told.kind and _overlaps(i, thread.told)]
+            if near:
+                out[thread.id] = near[0]
+                free.remove(near[0])
+    return out
+
+
+def _overlaps(now: Incident, told: Incident) -> bool:
+    """Whether an incident shares dives with one that was told, as far as that was told."""
+    until = told.cleared_at if told.cleared_at is not None else told.last.t_surface
+    return now.since <= until and (now.cleared_at is None or told.since <= now.cleared_at)
+
+
+def _is_news(incident: Incident, latest: Assessment) -> bool:
+    return incident.cleared_at is None or latest.t_surface - incident.cleared_at < NEWS
+
+
+def _begun(
+    incident: Incident, known: IncidentFacts, latest: Assessment, taken: set[str]
+) -> tuple[Thread, list[Alert]]:
+    identity = incident.id
+    while identity in taken:
+        identity += "+"
+    alert = incident_text.opened(
+        incident, incident.last, alert_id=f"{identity}/0", audience=incident.severity
+    )
+    alerts = [replace(alert, incident=identity)]
+    thread = Thread(identity, incident, incident.last, 1, latest.t_surface)
+    if incident.cleared_at is not None:
+        thread, more = _message(thread, incident, _clearing(incident, known), latest, "all_clear")
+        alerts += more
+    return thread, alerts
+
+
+def _clearing(incident: Incident, known: IncidentFacts) -> Assessment:
+    """The dive that cleared an incident."""
+    dive = known.last_surfacing(incident.cleared_at if incident.cleared_at is not None else float("inf"))
+    return dive if dive is not None else incident.last
+
+
+def _continued(
+    thread: Thread,
+    now: Incident | None,
+    known: IncidentFacts,
+    latest: Assessment,
+    reminder_hours: float | None,
+) -> tuple[Thread, list[Alert]]:
+    """One thread after what is known now, and its messages."""
+    dive = known.dive(thread.dive.t_dive) or known.last_surfacing(thread.dive.t_surface) or latest
+    if now is None:
+        if thread.withdrawn:
+            return thread, []
+        told, alerts = _message(thread, None, dive, latest, "correction", _why(thread, dive))
+        return replace(told, withdrawn=True), alerts
+    was_clear, is_clear = thread.told.cleared_at is not None, now.cleared_at is not None
+    if is_clear and not was_clear and not thread.withdrawn:
+        return _message(thread, now, _clearing(now, known), latest, "all_clear")
+    moved = now.since != thread.told.since or now.cleared_at != thread.told.cleared_at
+    if moved or thread.withdrawn or _changed(thread.dive, dive):
+        return _message(thread, now, dive, latest, "correction", _why(thread, dive))
+    hours = (latest.t_surface - thread.time) / 3600
+    if not is_clear and reminder_hours is not None and hours >= reminder_hours:
+        return _message(thread, now, latest, latest, "reminder")
+    return thread, []
+
+
+def _changed(told: Assessment, now: Assessment) -> bool:
+    """Whether what was told of a dive is no longer true enough."""
+    if told.flag != now.flag or (told.speed is None) != (now.speed is None):
+        return True
+    if told.speed is not None and now.speed is not None and abs(told.speed - now.speed) > SPEED_CHANGE:
+        return True
+    pairs = ((told.reference_u, now.reference_u), (told.reference_v, now.reference_v))
+    return any((a is None) != (b is None) or abs((a or 0.0) - (b or 0.0)) > FLOW_CHANGE for a, b in pairs)
+
+
+def _why(thread: Thread, now: Assessment) -> str:
+    """What data changed a message, in words."""
+    if now.t_dive != thread.dive.t_dive or now.n_samples != thread.dive.n_samples:
+        return "a segment that came late completed the data"
+    if (now.reference_u, now.reference_v) != (thread.dive.reference_u, thread.dive.reference_v):
+        return "the depth-averaged current of the dive was corrected"
+    return "data that came late changed the dives before"
+
+
+def _message(
+    thread: Thread, now: Incident | None, dive: Assessment, latest: Assessment, what: str, why: str = ""
+) -> tuple[Thread, list[Alert]]:
+    """The thread after one more message, about a `dive`, and the message."""
+    alert_id, audience = f"{thread.id}/{thread.messages}", thread.told.severity
+    if what == "correction":
+        alert = incident_text.correction(thread.told, now, dive, why, alert_id=alert_id, audience=audience)
+    elif what == "all_clear" and now is not None:
+        alert = incident_text.all_clear(now, dive, alert_id=alert_id, audience=audience)
+    else:
+        assert now is not None
+        hours = (dive.t_surface - now.since) / 3600
+        alert = incident_text.reminder(now, dive, hours, alert_id=alert_id, audience=audience)
+    told = Thread(thread.id, now or thread.told, dive, thread.messages + 1, latest.t_surface)
+    return told, [replace(alert, incident=thread.id)]
+
+
+# ----------------------------------------
+# What the incidents of a glider keep of it when old data are removed.
+
+
+def kept_since(incidents: Iterable[Incident], threads: Iterable[Thread], cut: float) -> float:
+    """The time (s), at the most `cut`, from which on all is kept for incidents that are not over at `cut`."""
+    over = [(i.since, math.inf if i.cleared_at is None else i.cleared_at) for i in incidents]
+    over += [(min(t.told.since, t.dive.t_dive), ended_at(t)) for t in threads]
+    floor, before = cut, math.inf
+    while floor < before:  # what is kept may reach further back, and then keep more
+        before = floor
+        floor = min([before, *(since for since, end in over if end >= before)])
+    return floor
+
+
+def ended_at(thread: Thread) -> float:
+    """When a thread had its last message (s); infinite while there may be one to come."""
+    if thread.withdrawn:
+        return thread.time
+    return math.inf if thread.told.cleared_at is None else max(thread.told.cleared_at, thread.time)
+
+
+def is_removable(incident: Incident, since: float) -> bool:
+    """Whether an incident was over before the time (s) from which on all is kept."""
+    return incident.cleared_at is not None and incident.cleared_at < since

@@ -1,0 +1,162 @@
+"""Flags in a row become an incident; normal dives in a row clear it. Pure.
+
+For each kind of incident a glider is in one phase. A dive says one of three things of a kind: it is
+`flagged`, it is `normal`, or nothing. A dive without a flag says nothing; one with flag 2 says nothing of
+an anomaly, because its speed is not to be believed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+from gliderwatch.model import Assessment, Flag, Incident, Kind
+from gliderwatch.params import AnomalyRule, FalseAlarmRule, RuleParams
+
+
+class Phase(StrEnum):
+    """Where a glider is with one kind of incident."""
+
+    OK = "ok"
+    PENDING = "pending"
+    OPEN = "open"
+
+
+class Event(StrEnum):
+    """What a dive means for one kind of incident."""
+
+    FLAGGED = "flagged"
+    CONFIRMED = "confirmed"
+    NORMAL = "normal"
+    CLEARED = "cleared"
+
+
+TRANSITIONS = {
+    (Phase.OK, Event.FLAGGED): Phase.PENDING,
+    (Phase.OK, Event.CONFIRMED): Phase.OPEN,
+    (Phase.OK, Event.NORMAL): Phase.OK,
+    (Phase.PENDING, Event.FLAGGED): Phase.PENDING,
+    (Phase.PENDING, Event.CONFIRMED): Phase.OPEN,
+    (Phase.PENDING, Event.NORMAL): Phase.OK,
+    (Phase.OPEN, Event.FLAGGED): Phase.OPEN,
+    (Phase.OPEN, Event.NORMAL): Phase.OPEN,
+    (Phase.OPEN, Event.CLEARED): Phase.OK,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class RuleState:
+    """State of one kind of incident of one glider.
+
+    ``flagged`` counts flagged dives in a row, ``normal`` the normal ones since, ``first`` is the first
+    flagged dive, ``incident`` the open one.
+    """
+
+    phase: Phase = Phase.OK
+    flagged: int = 0
+    normal: int = 0
+    first: Assessment | None = None
+    worst: Assessment | None = None
+    incident: Incident | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RuleStates:
+    """State of the rules of one glider after a dive."""
+
+    anomaly: RuleState = RuleState()
+    false_alarm: RuleState = RuleState()
+
+    def open(self) -> tuple[Incident, ...]:
+        """The incidents that are open."""
+        return tuple(w.incident for w in (self.anomaly, self.false_alarm) if w.incident is not None)
+
+
+def end_all(state: RuleStates, t: float) -> tuple[Incident, ...]:
+    """The incidents that were open, cleared at a time (s) because the deployment is over."""
+    return tuple(replace(incident, cleared_at=t) for incident in state.open())
+
+
+def advance(
+    state: RuleStates, dive: Assessment, rules: RuleParams
+) -> tuple[RuleStates, tuple[Incident, ...]]:
+    """The state after one more dive, and the incidents that it opened, carried on or cleared."""
+    if dive.flag is None:
+        return state, ()
+    anomaly, first = _watch(state.anomaly, dive, Kind.ANOMALY, _says_of_anomaly(dive), rules.anomaly)
+    false_alarm, second = _watch(
+        state.false_alarm, dive, Kind.FALSE_ALARM, dive.flag == Flag.FALSE_ALARM, rules.false_alarm
+    )
+    return RuleStates(anomaly, false_alarm), first + second
+
+
+def _says_of_anomaly(dive: Assessment) -> bool | None:
+    return None if dive.flag == Flag.FALSE_ALARM else dive.flag == Flag.ANOMALY
+
+
+def is_severe(dive: Assessment) -> bool:
+    """Whether the speed is below half of the lower bound of the normal range."""
+    return dive.speed is not None and dive.speed < dive.speed_min / 2
+
+
+def departure(dive: Assessment, kind: Kind) -> float:
+    """How far a dive is out of the ordinary, to find the worst one: m/s out of range, or p_E."""
+    if kind == Kind.FALSE_ALARM:
+        return dive.p_e or 0.0
+    return max(dive.speed_min - dive.speed, dive.speed - dive.speed_max) if dive.speed is not None else 0.0
+
+
+def _watch(
+    watch: RuleState, dive: Assessment, kind: Kind, flagged: bool | None, rule: AnomalyRule | FalseAlarmRule
+) -> tuple[RuleState, tuple[Incident, ...]]:
+    if flagged is None:
+        return watch, ()
+    count, normal = (watch.flagged + 1, 0) if flagged else (watch.flagged, watch.normal + 1)
+    event = _event(watch, dive, count, normal, flagged, rule)
+    phase = TRANSITIONS[watch.phase, event]
+    first, worst = watch.first, watch.worst
+    if flagged:
+        first = first or dive
+        worst = dive if worst is None or departure(dive, kind) > departure(worst, kind) else worst
+    if phase == Phase.OK and watch.incident is None:
+        return RuleState(), ()
+    if phase == Phase.PENDING:
+        return RuleState(phase, count, normal, first, worst), ()
+    assert first is not None and worst is not None
+    if event == Event.CONFIRMED:
+        incident = Incident(
+            id=f"{dive.glider}/{kind}/{first.t_dive:.0f}",
+            glider=dive.glider,
+            kind=kind,
+            severity=rule.severity,
+            since=first.t_dive,
+            opened_at=dive.t_surface,
+            cleared_at=None,
+            dives=count,
+            worst=worst,
+            last=dive,
+        )
+    else:
+        assert watch.incident is not None
+        incident = replace(
+            watch.incident, dives=count, worst=worst, last=dive if flagged else watch.incident.last
+        )
+    if phase == Phase.OK:
+        return RuleState(), (replace(incident, cleared_at=dive.t_surface),)
+    return RuleState(phase, count, normal, first, worst, incident), (incident,)
+
+
+def _event(
+    watch: RuleState,
+    dive: Assessment,
+    count: int,
+    normal: int,
+    flagged: bool,
+    rule: AnomalyRule | FalseAlarmRule,
+) -> Event:
+    if not flagged:
+        return Event.CLEARED if watch.phase == Phase.OPEN and normal >= rule.clear_after else Event.NORMAL
+    needed = rule.open_after
+    if isinstance(rule, AnomalyRule) and is_severe(dive):
+        needed = min(needed, rule.open_after_severe)
+    return Event.CONFIRMED if watch.phase != Phase.OPEN and count >= needed else Event.FLAGGED

@@ -1,1 +1,0 @@
-"""Between the file system and a decoded `model.Segment`."""

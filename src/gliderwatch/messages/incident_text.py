@@ -1,0 +1,323 @@
+"""What people read: one structure of facts, rendered as title, text and HTML. Pure.
+
+Written for a pilot with a phone at 3 am: the first line says what and how bad, then since when,
+where, the numbers, what speaks for and against, what to check. Names and notes come from files, so
+each is made one printable line (`words.clean`). The caller gives each alert its id and audience.
+"""
+
+from __future__ import annotations
+
+from gliderwatch.messages.evidence import checks, difference, how_sure, out_of_range, weigh
+from gliderwatch.messages.formatting import (
+    INCIDENTS,
+    UNKNOWN,
+    clean,
+    duration,
+    flow,
+    known,
+    map_link,
+    place,
+    speed,
+    utc,
+)
+from gliderwatch.messages.template import Page
+from gliderwatch.model import Alert, Assessment, Flag, Incident, Kind, NextSurfacing, Severity
+
+TITLES = {Kind.ANOMALY: "ANOMALY", Kind.FALSE_ALARM: "MEASUREMENTS DISAGREE"}
+
+
+def opened(incident: Incident, assessment: Assessment, *, alert_id: str, audience: Severity) -> Alert:
+    """The first message of an incident; `assessment` is the dive whose surfacing opened it."""
+    page = Page(
+        (_headline(incident.kind, assessment),),
+        (_since(incident), *_facts(assessment, incident.dives)),
+        (*_weighed(incident.kind, assessment), ("Check", checks(incident, assessment))),
+    )
+    doubt = "do not trust its speed, " if incident.kind is Kind.FALSE_ALARM else ""
+    title = f"{TITLES[incident.kind]} {_glider(incident)}: {doubt}{_against_range(assessment)}"
+    return _alert(
+        incident,
+        assessment.t_surface,
+        incident.kind,
+        title,
+        page,
+        severity=incident.severity,
+        alert_id=alert_id,
+        audience=audience,
+    )
+
+
+def reminder(
+    incident: Incident, latest: Assessment, hours: float, *, alert_id: str, audience: Severity
+) -> Alert:
+    """The incident is still open `hours` after it began; `latest` is the glider's last assessed dive."""
+    age = duration(hours * 3600)
+    lead = f"{_glider(incident)}: the {_name(incident)} is still open after {age}. "
+    lead += f"Latest dive: {flag_words(latest)}."
+    flagged = latest.flag == (Flag.FALSE_ALARM if incident.kind is Kind.FALSE_ALARM else Flag.ANOMALY)
+    page = Page(
+        (lead, _headline(incident.kind, latest)) if flagged else (lead,),
+        (_since(incident), ("Worst", _worst(incident)), *_facts(latest, incident.dives)),
+        (*_weighed(incident.kind, latest), ("Check", checks(incident, latest))),
+    )
+    title = f"REMINDER {_glider(incident)}: {_name(incident)} for {age}, {_against_range(latest)}"
+    return _alert(
+        incident,
+        latest.t_surface,
+        Kind.REMINDER,
+        title,
+        page,
+        severity=incident.severity,
+        alert_id=alert_id,
+        audience=audience,
+    )
+
+
+def all_clear(incident: Incident, assessment: Assessment, *, alert_id: str, audience: Severity) -> Alert:
+    """The incident is over; `assessment` is the dive that cleared it."""
+    end = assessment.t_surface if incident.cleared_at is None else incident.cleared_at
+    lead = f"{_glider(incident)} is normal again: {_against_range(assessment)}. "
+    lead += f"The {_name(incident)} is over."
+    page = Page(
+        (lead,),
+        (
+            _since(incident),
+            ("Lasted", f"{duration(end - incident.since)}, cleared {utc(end)}"),
+            ("Worst", _worst(incident)),
+            *_facts(assessment, 0),
+        ),
+    )
+    title = f"ALL CLEAR {_glider(incident)}: {_against_range(assessment)}"
+    return _alert(
+        incident,
+        assessment.t_surface,
+        Kind.ALL_CLEAR,
+        title,
+        page,
+        severity=Severity.INFO,
+        alert_id=alert_id,
+        audience=audience,
+    )
+
+
+def correction(
+    before: Incident,
+    now: Incident | None,
+    assessment: Assessment,
+    why: str,
+    *,
+    alert_id: str,
+    audience: Severity,
+) -> Alert:
+    """Data that came later changed what was said: `before` as told, `now` as known (None: withdrawn).
+
+    `assessment` is the dive concerned as it is assessed now, `why` says what data did it.
+    """
+    lead = f"Correction for {_glider(before)}: {clean(why)}. "
+    lead += f"The {_name(before)} {'is withdrawn' if now is None else 'stands'}. "
+    lead += f"The dive as assessed now: {flag_words(assessment)}."
+    page = Page(
+        (lead,),
+        (
+            ("Told before", _told(before)),
+            ("Known now", "no incident" if now is None else _told(now)),
+            *_facts(assessment, 0 if now is None else now.dives),
+        ),
+        () if now is None else _weighed(before.kind, assessment),
+    )
+    verdict = "withdrawn" if now is None else "stands"
+    title = f"CORRECTION {_glider(before)}: {_name(before)} {verdict}, {_against_range(assessment)}"
+    severity = Severity.INFO if now is None else now.severity
+    return _alert(
+        before,
+        assessment.t_surface,
+        Kind.CORRECTION,
+        title,
+        page,
+        severity=severity,
+        alert_id=alert_id,
+        audience=audience,
+    )
+
+
+def surfacing(
+    assessment: Assessment,
+    previous: float | None,
+    *,
+    alert_id: str,
+    expected: NextSurfacing | None = None,
+    audience: Severity = Severity.INFO,
+) -> Alert:
+    """The notice of one surfacing; `previous` is the time of the one before (s), `expected` the next."""
+    a = assessment
+    after: tuple[tuple[str, str], ...] = ()
+    if previous is not None:
+        after = (("After the one before", duration(a.t_surface - previous)),)
+    if expected is not None:
+        when = f"{utc(expected.t)}, within {duration(1.96 * expected.t_sigma)} (95 %)"
+        after += (("Next surfacing", f"{when}, {place(expected.lat, expected.lon)}"),)
+    page = Page(
+        (f"{_glider(a)} surfaced {utc(a.t_surface)}: {flag_words(a)}.",),
+        (*after, *_facts(a, 0)),
+        (("Data", tuple(clean(note) for note in a.notes)),) if a.notes else (),
+    )
+    title = f"SURFACED {_glider(a)} {utc(a.t_surface)}: {_speed(a)}, {flag_words(a, short=True)}"
+    return _alert(
+        a,
+        a.t_surface,
+        Kind.SURFACING,
+        title,
+        page,
+        severity=Severity.INFO,
+        alert_id=alert_id,
+        audience=audience,
+    )
+
+
+def operator(
+    title: str,
+    text: str,
+    time: float,
+    *,
+    alert_id: str,
+    severity: Severity,
+    audience: Severity,
+    glider: str = "",
+) -> Alert:
+    """A message about the watch itself, not about a flight: a folder gone, files that cannot be read."""
+    lines = tuple(line for line in (clean(raw, 500) for raw in text.splitlines()) if line)
+    subject = f"GLIDERWATCH {clean(glider, 40)}: {title}" if glider else f"GLIDERWATCH: {title}"
+    page = Page(lines, (("Time", utc(time)),))
+    return _alert(
+        glider, time, Kind.OPERATOR, subject, page, severity=severity, alert_id=alert_id, audience=audience
+    )
+
+
+def flag_words(assessment: Assessment, *, short: bool = False) -> str:
+    """The flag of a dive in words."""
+    if assessment.flag is None:
+        reason = clean(assessment.reason, 60)
+        return f"not assessed ({reason})" if reason else "not assessed"
+    words = {
+        Flag.NORMAL: ("normal", ""),
+        Flag.ANOMALY: ("anomaly", "speed out of its normal range"),
+        Flag.FALSE_ALARM: ("measurements disagree", "flow and reference disagree"),
+    }[Flag(assessment.flag)]
+    if short or assessment.flag == Flag.NORMAL:
+        return words[0]
+    return f"{words[0]}: {clean(assessment.reason, 100) or words[1]}"
+
+
+def _alert(
+    about: Incident | Assessment | str,
+    time: float,
+    kind: Kind,
+    title: str,
+    page: Page,
+    *,
+    severity: Severity,
+    alert_id: str,
+    audience: Severity,
+) -> Alert:
+    title = clean(title)
+    return Alert(
+        id=alert_id,
+        glider=about if isinstance(about, str) else about.glider,
+        time=time,
+        kind=kind,
+        severity=severity,
+        audience=audience,
+        incident=about.id if isinstance(about, Incident) else "",
+        title=title,
+        body=page.text(),
+        html=page.html(title),
+    )
+
+
+def _name(incident: Incident) -> str:
+    return INCIDENTS[incident.kind]
+
+
+def _glider(about: Incident | Assessment) -> str:
+    return clean(about.glider, 40)
+
+
+def _normal(a: Assessment) -> str:
+    return f"normal {a.speed_min:.2f} to {a.speed_max:.2f}"
+
+
+def _speed(a: Assessment) -> str:
+    """The speed, with a third digit where two would make it look within its range though it is not."""
+    value = known(a.speed)
+    if value is not None and out_of_range(a, value) and not out_of_range(a, round(value, 2)):
+        return f"{value:.3f} m/s"
+    return speed(value)
+
+
+def _against_range(a: Assessment) -> str:
+    value = "speed unknown" if known(a.speed) is None else f"{_speed(a)} through water"
+    return f"{value} ({_normal(a)})"
+
+
+def _headline(kind: Kind, a: Assessment) -> str:
+    """What is wrong and how badly, in one sentence or two."""
+    value = known(a.speed)
+    if kind is Kind.FALSE_ALARM:
+        apart, p_e = difference(a), known(a.p_e)
+        size = ""
+        if apart is not None and p_e is not None and p_e > a.gamma_f:
+            size = f" by {speed(apart)} (p_E {p_e:.3f}, limit {a.gamma_f:.3f})"
+        why = clean(a.reason, 100) or "flow and reference disagree"
+        return f"{_glider(a)}: {why}{size}. Its speed of {_speed(a)} cannot be trusted."
+    sentence = f"{_glider(a)} flies at {_speed(a)} through the water"
+    if value is None or not out_of_range(a, value):
+        why = clean(a.reason, 100) if a.flag == Flag.ANOMALY else ""
+        return f"{sentence}, {_normal(a)} m/s" + (f": {why}." if why else ".")
+    bound, word = (a.speed_max, "highest") if value > a.speed_max else (a.speed_min, "lowest")
+    share = f"{int(100 * max(value, 0.0) / bound)} % of" if bound > 0 else "against"
+    return f"{sentence}: {share} its {word} normal speed of {speed(bound)}."
+
+
+def _since(incident: Incident) -> tuple[str, str]:
+    return "Since", f"{utc(incident.since)} ({_dives(incident)})"
+
+
+def _dives(incident: Incident) -> str:
+    return "1 dive" if incident.dives == 1 else f"{incident.dives} dives"
+
+
+def _worst(incident: Incident) -> str:
+    return f"{_speed(incident.worst)}, dive of {utc(incident.worst.t_dive)}"
+
+
+def _told(incident: Incident) -> str:
+    state = "open" if incident.cleared_at is None else f"cleared {utc(incident.cleared_at)}"
+    since = f"{_name(incident)} since {utc(incident.since)}"
+    return f"{since}, {_dives(incident)}, worst {_speed(incident.worst)}, {state}"
+
+
+def _facts(a: Assessment, dives: int) -> tuple[tuple[str, str], ...]:
+    """Where, the dive, speed against range, flow against reference, how sure."""
+    link, apart, p_e = map_link(a.lat, a.lon), difference(a), known(a.p_e)
+    reference = flow(a.reference_u, a.reference_v)
+    if reference != UNKNOWN:
+        reference += " (final)" if a.reference_final else " (provisional)"
+    disagreement = ""
+    if apart is not None and p_e is not None:
+        disagreement = f"{speed(apart)}, p_E {p_e:.3f} (limit {a.gamma_f:.3f})"
+    return (
+        ("Where", place(a.lat, a.lon)),
+        *((("Map", link),) if link else ()),
+        ("Dive", f"{utc(a.t_dive)} to {utc(a.t_surface)}, segment {clean(a.segment, 60)}"),
+        ("Speed through water", f"{_speed(a)}, {_normal(a)} m/s"),
+        ("Flow learnt", flow(a.flow_u, a.flow_v)),
+        ("Reference flow", reference),
+        *((("Disagreement", disagreement),) if disagreement else ()),
+        ("How sure", how_sure(a, dives)),
+    )
+
+
+def _weighed(kind: Kind, a: Assessment) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    pro, con = weigh(a, kind)
+    nothing = ("nothing found in this dive",)
+    return ("Speaks for", pro or nothing), ("Speaks against", con or nothing)

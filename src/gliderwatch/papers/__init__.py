@@ -1,0 +1,1 @@
+"""The exact algorithms of the papers. Pure."""

@@ -1,1 +1,0 @@
-"""The shell: the daemon and the replay, two sources of events for one path."""

@@ -1,0 +1,3 @@
+"""The daemon and the replay: two sources of events for one path."""
+
+from __future__ import annotations

@@ -1,0 +1,386 @@
+"""A past mission through the same path as a live one, with a state of its own."""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from gliderwatch.config import Config, expand
+from gliderwatch.delivery.channels import Channel
+from gliderwatch.delivery.dispatcher import Dispatcher
+from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine, Retry
+from gliderwatch.incidents.overdue import GONE
+from gliderwatch.model import Alert, Hindrance, Segment
+from gliderwatch.navigation.clock import Stamp, corrections, is_same, numbered
+from gliderwatch.params import GliderParams
+from gliderwatch.service import transaction, triage
+from gliderwatch.service.jsonl import alert_line, assessment_line, write_lines
+from gliderwatch.service.liveness import alive_path
+from gliderwatch.service.ocean_cache import OceanCache
+from gliderwatch.service.routing import NOBODY, Routing, routing_of
+from gliderwatch.service.triage import Job
+from gliderwatch.slocum.decode import Decoder
+from gliderwatch.slocum.folders import kind, rank
+from gliderwatch.slocum.header import read_header
+from gliderwatch.slocum.sensor_lists import SensorLists, lists_folder
+from gliderwatch.store.database import MEMORY, refuse_foreign
+from gliderwatch.store.outbox import Outbox
+from gliderwatch.store.state_file import File, Status, Store
+
+# ----------------------------------------
+# The files of several gliders in the order of their sending: for a replay, whose time is theirs.
+
+LONGEST = 2 * 86400.0
+"""Seconds after which a file is sent at the latest: if the next is opened later, there was a pause."""
+
+
+class ReplayOrder:
+    """Puts decoded jobs, which come as their files were opened, into the order of their sending."""
+
+    def __init__(self, jobs: Iterable[Job]) -> None:
+        self._coming: dict[str, deque[float]] = {}
+        self._ready: dict[str, deque[Job]] = {}
+        for job in jobs:
+            self._coming.setdefault(job.header.id.glider, deque()).append(job.opened_at)
+            self._ready[job.header.id.glider] = deque()
+
+    def after(self, job: Job) -> Iterator[tuple[Job, float]]:
+        """The jobs whose turn it is once one more is decoded, each with the time (s) of its sending."""
+        self._coming[job.header.id.glider].popleft()
+        self._ready[job.header.id.glider].append(job)
+        while heads := [(self._sent(glider), glider) for glider, ready in self._ready.items() if ready]:
+            sent, first = min(heads)
+            if any(c and c[0] < sent and not self._ready[g] for g, c in self._coming.items()):
+                return  # a file that was opened before may have been sent before
+            yield self._ready[first].popleft(), sent
+
+    def _sent(self, glider: str) -> float:
+        """When the first file that is ready was sent: at its end, else before the next was opened."""
+        job, *later = self._ready[glider]
+        if isinstance(job.result, Segment):
+            return job.result.last_t + job.offset
+        opened = job.opened_at
+        coming = [*(j.opened_at for j in later), *self._coming[glider]]
+        return min(next(iter(coming), opened), opened + LONGEST)
+
+
+# ----------------------------------------
+# A past mission through the same path as a live one, with a state of its own.
+
+STATE = "replay.sqlite"
+"""Name of the state file in the folder of results: another one than a daemon's usual."""
+ASSESSMENTS, ALERTS = "assessments.jsonl", "alerts.jsonl"
+WRITTEN = (ASSESSMENTS, ALERTS, STATE)
+"""All that is left in the folder of results."""
+SEND_PATIENCE = 120.0
+"""Seconds that `--send` waits at the end for messages to be delivered."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What to replay: folders, cache folders, the configuration (None: defaults), one glider or all,
+    where results go, whether alerts are sent."""
+
+    folders: tuple[Path, ...]
+    caches: tuple[Path, ...] = ()
+    config: Config | None = None
+    glider: str | None = None
+    out: Path | None = None
+    send: bool = False
+
+    def params(self, glider: str) -> GliderParams:
+        """The parameters of a glider."""
+        return GliderParams() if self.config is None else self.config.glider(glider)
+
+    def is_wanted(self, glider: str) -> bool:
+        """Whether a glider is to be replayed: the one named, else those of the configuration, else all."""
+        if self.glider is not None:
+            return glider == self.glider
+        return self.config is None or glider in self.config.gliders
+
+
+@dataclass(slots=True)
+class Report:
+    """What a replay found: files by status with reasons, and the store that holds the rest.
+
+    ``clock`` is what time it is for each glider (s): that of its data. ``coming`` is when its files were
+    opened that are not taken yet (s).
+    """
+
+    store: Store
+    ocean: OceanCache | None = None
+    files: Counter[Status] = field(default_factory=Counter)
+    undelivered: int = 0
+    clock: dict[str, float] = field(default_factory=dict)
+    coming: dict[str, deque[float]] = field(default_factory=dict)
+
+
+def replay(
+    request: Request,
+    *,
+    on_total: Callable[[int], None] = lambda n: None,
+    on_file: Callable[[transaction.FileOutcome], None] = lambda taken: None,
+    workers: int = 1,
+) -> Report:
+    """Replay the files of some folders in the order of time. Raises GliderwatchError where there are none."""
+    files = find_files(request.folders)
+    if not files:
+        where = ", ".join(map(str, request.folders))
+        raise GliderwatchError(f"no flight data files (sbd, scd, mbd, mcd, dbd, dcd) below {where}")
+    on_total(len(files))
+    with _state(request) as path, tempfile.TemporaryDirectory(prefix="gliderwatch-") as kept:
+        lists = SensorLists(Path(kept))
+        ocean = None if request.config is None else OceanCache(request.config)
+        report = Report(Store.open(path, durable=False), ocean)
+        with _speaking(request, path, report) as told:
+            jobs = _triage(files, report, lists, request, on_file)
+            _check_glider(request, jobs, report.store)
+            for job in jobs:
+                report.coming.setdefault(job.header.id.glider, deque()).append(job.header.id.opened_at)
+            turns = ReplayOrder(jobs)
+            for decoded in _decoded(jobs, [*cache_folders(request), lists.folder], workers):
+                for job, sent in turns.after(decoded):
+                    _take(job, sent, report, request, told, on_file)
+        if request.out is not None:
+            _write(request.out, report.store)
+    return report
+
+
+def find_files(folders: Iterable[Path]) -> list[Path]:
+    """All flight data files below some folders, each once.
+
+    The folders may be links. Below them a link is treated as the service does: a file that is one is named
+    and left alone, a folder that is one is not looked into.
+    """
+    found = {
+        path: None
+        for folder in folders
+        for path in sorted([folder] if folder.is_file() else folder.rglob("*"))
+        if kind(path.name) is not None and (path.is_symlink() or not path.is_dir())
+    }
+    return list(found)
+
+
+def cache_folders(request: Request) -> list[Path]:
+    """The cache folders named and configured, the folders replayed, any `cache` in or beside them, and the
+    lists that the service of the configuration has kept."""
+    folders = [*request.caches]
+    if request.config is not None:
+        folders += expand(request.config.dockserver.cache)
+        folders.append(lists_folder(Path(request.config.state.path)))
+    for folder in request.folders:
+        around = [
+            folder,
+            *folder.glob("[cC][aA][cC][hH][eE]"),
+            *folder.resolve().parent.glob("[cC][aA][cC][hH][eE]"),
+        ]
+        folders += [f for f in around if f.is_dir()]
+    return list(dict.fromkeys(folders))
+
+
+@contextmanager
+def _state(request: Request) -> Iterator[Path | str]:
+    """Where the replay keeps its state: never where the daemon does."""
+    if request.out is not None:
+        yield _fresh(request.out / STATE, request.config)
+    elif request.send:
+        with tempfile.TemporaryDirectory(prefix="gliderwatch-") as folder:
+            yield Path(folder) / "state.sqlite"
+    else:
+        yield MEMORY
+
+
+def _fresh(path: Path, config: Config | None) -> Path:
+    """A state file of which nothing is there: what an earlier replay left is removed."""
+    if alive_path(path).exists() or (config is not None and path.resolve() == Path(config.state.path)):
+        raise GliderwatchError(f"{path} is the state of a daemon: choose another folder for --out")
+    refuse_foreign(path, "Choose another folder for --out")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        for old in (path, *path.parent.glob(f"{path.name}-*")):
+            old.unlink(missing_ok=True)
+    except OSError as error:
+        raise GliderwatchError(f"{path} cannot be written: {error.strerror}") from None
+    return path
+
+
+@contextmanager
+def _speaking(request: Request, path: Path | str, report: Report) -> Iterator[Routing]:
+    """Who is told: nobody, or with `send` whom the configuration says, until all is delivered."""
+    if not request.send or request.config is None:
+        yield NOBODY if request.config is None else _silent(request.config)
+        return
+    config, wake = request.config, threading.Event()
+    channels = {n: Channel(n, config.channel_url(n).get_secret_value()) for n in config.channels}
+    outbox = Path(path)
+    dispatcher = Dispatcher(lambda: Outbox(outbox), channels, time.time, wake)
+    dispatcher.start()
+    try:
+        yield _at_once(config)
+        deadline = time.monotonic() + SEND_PATIENCE
+        while report.store.undelivered() and time.monotonic() < deadline:
+            wake.set()
+            time.sleep(0.05)
+    finally:
+        dispatcher.stop()
+    report.undelivered = len(report.store.undelivered())
+
+
+def _silent(config: Config) -> Routing:
+    """The messages of a configuration, for nobody: they are made and shown, not sent."""
+    return replace(routing_of(config), channels=NOBODY.channels)
+
+
+def _at_once(config: Config) -> Routing:
+    """As the configuration says, but nobody waits: what they would have waited for is past."""
+    told = routing_of(config)
+    return replace(told, channels=lambda alert: list(told.channels(alert)))
+
+
+def _triage(
+    files: Sequence[Path],
+    report: Report,
+    lists: SensorLists,
+    request: Request,
+    on_file: Callable[[transaction.FileOutcome], None],
+) -> list[Job]:
+    """The files to decode in the order of time, the fullest copy of a segment first.
+
+    Those that leave their sensor list out are looked at last: any of the others may hold it.
+    """
+    caches = [*cache_folders(request), lists.folder]
+    jobs, noted = list[Job](), list[File]()
+
+    def look(path: Path) -> None:
+        found = triage.triage(path, report.store, caches, request.is_wanted)
+        if isinstance(found, Job):
+            lists.keep(path, found.header)
+            jobs.append(found)
+        elif found is not None:
+            noted.append(found)
+
+    for path in files:
+        look(path)
+    waiting, noted = [file for file in noted if file.crc], [file for file in noted if not file.crc]
+    for file in waiting:
+        look(Path(file.path))
+    for found in noted:
+        if found.hindrance is Hindrance.NO_CACHE:  # a sign of life: it has its turn with the others
+            jobs.append(Job(found, read_header(Path(found.path)), MissingCache(found.crc, caches)))
+        else:
+            _note(found, report, request, on_file)
+    _correct_clocks(jobs)
+    return sorted(jobs, key=lambda j: (j.opened_at, j.header.id, -rank(j.header.kind), j.file.path))
+
+
+def _correct_clocks(jobs: Sequence[Job]) -> None:
+    """Give the files of a glider whose clock fell back their turn: when they were sent, not years before."""
+    missions: dict[tuple[str, str], dict[str, list[list[Job]]]] = {}
+    for job in jobs:
+        mission = job.header.id.glider, numbered(job.header.id.name)[0]
+        segments = missions.setdefault(mission, {}).setdefault(job.header.id.name, [])
+        copies = next((s for s in segments if is_same(s[0].header.id, job.header.id)), None)
+        if copies is None:
+            segments.append([job])
+        else:
+            copies.append(job)
+    for by_name in missions.values():
+        segments = [copies for found in by_name.values() for copies in found]
+        opened = [(copies[0].header.id.name, copies[0].header.id.opened_at) for copies in segments]
+        stamps = [Stamp(numbered(name)[1], t, t) for name, t in opened]
+        for copies, correction in zip(segments, corrections(stamps), strict=True):
+            for job in copies:
+                job.offset = correction.offset
+
+
+def _note(
+    file: File, report: Report, request: Request, on_file: Callable[[transaction.FileOutcome], None]
+) -> None:
+    """Write down a file that is not decoded."""
+    if file.status == Status.UNKNOWN and request.glider is not None:
+        file = replace(file, reason=f"of {file.glider}, not of {request.glider}")
+    _count(transaction.record_file(report.store, file, GliderParams(), None, time.time()), report, on_file)
+
+
+def _check_glider(request: Request, jobs: Sequence[Job], store: Store) -> None:
+    """Raises GliderwatchError where the glider asked for has no files, but others have."""
+    others = sorted({file.glider for file in store.files(Status.UNKNOWN)})
+    asked = {job.header.id.glider for job in jobs}
+    if request.glider is not None and others and request.glider not in asked:
+        raise GliderwatchError(f"no files of glider {request.glider}, but of: {', '.join(others)}")
+
+
+def _decoded(jobs: Sequence[Job], caches: Sequence[Path], workers: int) -> Iterator[Job]:
+    with Decoder(caches, max_workers=workers) as decoder:
+        results = decoder.map([Path(job.file.path) for job in jobs if job.result is None])
+        for job in jobs:
+            if job.result is None:
+                job.result = next(results)[1]
+            yield job
+
+
+def _take(
+    job: Job,
+    sent: float,
+    report: Report,
+    request: Request,
+    told: Routing,
+    on_file: Callable[[transaction.FileOutcome], None],
+) -> None:
+    """Let the clock run until a file was `sent` (s), and take it."""
+    glider = job.header.id.glider
+    params, ticked = request.params(glider), _tick(report, told, sent)
+    try:
+        if not isinstance(job.result, Segment):
+            raise job.result if job.result is not None else Retry("was not decoded")
+        ocean = None if report.ocean is None else report.ocean.field(glider)
+        taken = transaction.process_file(report.store, job.file, job.result, params, told, sent, ocean=ocean)
+    except (Quarantine, Retry) as error:
+        taken = transaction.record_file(report.store, triage.failed(job.file, error), params, told, sent)
+    report.coming[glider].popleft()
+    report.clock[glider] = max(sent, report.clock.get(glider, sent))
+    _count(replace(taken, alerts=(*ticked, *taken.alerts)), report, on_file)
+
+
+def _tick(report: Report, told: Routing, until: float) -> list[Alert]:
+    """What a daemon would have said of the silence of all gliders until a time (s), in its order.
+
+    Nothing between two deployments, nor after the last file: a replay knows that a deployment has ended.
+    """
+    store, alerts = report.store, list[Alert]()
+    while True:
+        due = {g: t for g in report.clock if (t := _due(g, report, told, until)) is not None}
+        if not due:
+            return alerts
+        glider = min(due, key=lambda g: (due[g], g))
+        others = [g for g in store.gliders() if g != glider and not told.attention(g).recovered]
+        alerts += transaction.tick(store, glider, told, others, due[glider])
+        report.clock[glider] = due[glider]
+
+
+def _due(glider: str, report: Report, told: Routing, until: float) -> float | None:
+    """When there is something to say next of a glider's silence, if that is before `until` (s)."""
+    now, coming = report.clock[glider], report.coming[glider]
+    if not coming or coming[0] - now >= GONE:
+        return None
+    at = transaction.next_tick(report.store, glider, told, now)
+    return at if at is not None and now < at <= until else None
+
+
+def _count(
+    taken: transaction.FileOutcome, report: Report, on_file: Callable[[transaction.FileOutcome], None]
+) -> None:
+    report.files[taken.file.status] += 1
+    on_file(taken)
+
+
+def _write(out: Path, store: Store) -> None:
+    assessments = (assessment_line(a) for glider in store.gliders() for a in store.assessments(glider))
+    write_lines(out / ASSESSMENTS, assessments)
+    write_lines(out / ALERTS, (alert_line(a) for a in store.alerts()))

@@ -1,0 +1,137 @@
+"""What the daemon is made of: everything that follows from one configuration, replaced as a whole."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from queue import SimpleQueue
+
+from gliderwatch.config import Config
+from gliderwatch.delivery.channels import Channel
+from gliderwatch.delivery.dispatcher import Dispatcher
+from gliderwatch.model import Segment
+from gliderwatch.service.ocean_cache import OceanCache
+from gliderwatch.service.routing import Routing, routing_of
+from gliderwatch.service.triage import Backlog, Job
+from gliderwatch.slocum.decode import Decoder
+from gliderwatch.slocum.folders import Settling
+from gliderwatch.slocum.sensor_lists import SensorLists, lists_folder
+from gliderwatch.slocum.watch import Change, Watcher
+from gliderwatch.store.outbox import Outbox
+
+
+@dataclass(frozen=True, slots=True)
+class Decoded:
+    """News of the decoder: a job of a backlog is done."""
+
+    backlog: Backlog
+    job: Job
+    future: Future[Segment]
+
+    @property
+    def outcome(self) -> Segment | Exception:
+        """The segment, or why there is none."""
+        error = self.future.exception()
+        return error if isinstance(error, Exception) else self.future.result()
+
+
+News = Change | Decoded | signal.Signals
+
+
+@dataclass(frozen=True, slots=True)
+class Runtime:
+    """A configuration and what works by it. ``urls`` (with their secrets) tell whether channels changed."""
+
+    config: Config
+    news: SimpleQueue[News]
+    workers: int
+    speaking: Routing
+    settling: Settling
+    watcher: Watcher
+    decoder: Decoder
+    lists: SensorLists
+    backlog: Backlog
+    dispatcher: Dispatcher
+    ocean: OceanCache
+    urls: dict[str, str] = field(repr=False)
+
+    def start(self, before: Runtime | None = None) -> None:
+        """Begin to work, in place of the parts before."""
+        if before is None or before.dispatcher is not self.dispatcher:
+            self.dispatcher.start()
+        self.watcher.start()
+
+    def stop(self, after: Runtime | None = None) -> None:
+        """End all work; the decoder, and a dispatcher that the parts after go on with, are left to them."""
+        self.watcher.stop()
+        if after is None:
+            self.decoder.close()
+        if after is None or after.dispatcher is not self.dispatcher:
+            self.dispatcher.stop()
+
+    def cache_folders(self) -> tuple[Path, ...]:
+        """Where sensor lists are now: the cache folders, then the lists that came inside of files."""
+        return (*self.watcher.cache_folders(), self.lists.folder)
+
+    def feed(self) -> None:
+        """Keep the decoder busy, with no more than it can take."""
+        while self.backlog.decoding < 2 * self.workers and (job := self.backlog.next()) is not None:
+            job.begun = time.monotonic()
+            self.decoder.submit(Path(job.file.path)).add_done_callback(partial(self._decoded, job))
+
+    def _decoded(self, job: Job, future: Future[Segment]) -> None:
+        self.news.put(Decoded(self.backlog, job, future))
+
+
+def build(
+    config: Config,
+    news: SimpleQueue[News],
+    wake: threading.Event,
+    workers: int,
+    before: Runtime | None = None,
+) -> Runtime:
+    """The parts of a configuration, not started. Raises ConfigError where a secret is missing.
+
+    With the channels of the parts before their dispatcher goes on: a message that is on its way when the
+    configuration is read again is then not sent a second time. Their decoder goes on always, with its worker
+    processes.
+    """
+    urls = {name: config.channel_url(name).get_secret_value() for name in config.channels}
+    if before is not None and before.urls == urls:
+        dispatcher = before.dispatcher
+    else:
+        state = Path(config.state.path)
+        channels = {name: Channel(name, url) for name, url in urls.items()}
+        dispatcher = Dispatcher(lambda: Outbox(state), channels, time.time, wake)
+    watcher = Watcher(
+        config.dockserver.roots,
+        {name: glider.paths for name, glider in config.gliders.items()},
+        config.dockserver.cache,
+        news,
+        config.dockserver.observer,
+    )
+    ocean, speaks = OceanCache(config), routing_of(config)
+    lists = SensorLists(lists_folder(Path(config.state.path)))
+    # shared: what follows can no longer refuse the configuration
+    decoder = Decoder((), max_workers=workers) if before is None else before.decoder
+    parts = Runtime(
+        config,
+        news,
+        workers,
+        speaks,
+        Settling(config.dockserver.settle_seconds),
+        watcher,
+        decoder,
+        lists,
+        Backlog(),
+        dispatcher,
+        ocean,
+        urls,
+    )
+    decoder.cache_folders = parts.cache_folders()
+    return parts

@@ -1,0 +1,258 @@
+"""What to do with a file that has come (decode it, wait, or leave it alone), and the queue of files for the
+decoder."""
+
+from __future__ import annotations
+
+import heapq
+from collections import OrderedDict, deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import chain
+from pathlib import Path
+
+from gliderwatch.errors import MissingCache, NotAssessed, Quarantine, Retry
+from gliderwatch.model import Hindrance, Segment
+from gliderwatch.slocum.caches import is_there
+from gliderwatch.slocum.folders import Settling
+from gliderwatch.slocum.header import Header, read_header
+from gliderwatch.slocum.science import needs_science, science_files
+from gliderwatch.store.state_file import File, Status, Store
+
+# ----------------------------------------
+# Files on their way from settled to taken: in order within a glider, in turn between gliders.
+
+AHEAD = 16
+"""Files of one glider that may be decoded, or done with it, before the first of them is taken."""
+
+
+@dataclass(slots=True)
+class Job:
+    """A file to decode, ``begun`` (s, monotonic); ``result`` is there once it is decoded or has failed.
+
+    ``offset`` is what is to be added to the glider's clock (s), as far as headers tell.
+    """
+
+    file: File
+    header: Header
+    result: Segment | Exception | None = None
+    begun: float | None = None
+    offset: float = 0.0
+
+    @property
+    def opened_at(self) -> float:
+        """When the file was opened (s), by a clock that is right."""
+        return self.header.id.opened_at + self.offset
+
+
+@dataclass(slots=True)
+class _Queue:
+    waiting: list[tuple[float, str, str, Job]] = field(default_factory=list)
+    decoding: deque[Job] = field(default_factory=deque)
+
+
+class Backlog:
+    """Oldest first within each glider, so that nothing has to be taken back; gliders take turns.
+
+    One glider with a month of files delays no other: one that had none at hand is next. A file that takes
+    long to decode delays its own glider alone. ``decoding`` counts the files that are being decoded.
+    """
+
+    def __init__(self) -> None:
+        self._queues: OrderedDict[str, _Queue] = OrderedDict()
+        self._new: dict[str, None] = {}
+        self._paths: set[str] = set()
+        self.decoding = 0
+
+    def __len__(self) -> int:
+        return len(self._paths)
+
+    def add(self, job: Job) -> None:
+        """Put a file into the queue of its glider; one that is there already stays as it is."""
+        if job.file.path in self._paths:
+            return
+        self._paths.add(job.file.path)
+        glider = job.header.id.glider
+        if glider not in self._queues:  # a file that just came does not wait for a round of all gliders
+            self._queues[glider] = _Queue()
+            self._new[glider] = None
+        queue = self._queues[glider]
+        heapq.heappush(queue.waiting, (job.header.id.opened_at, job.header.id.name, job.file.path, job))
+
+    def next(self) -> Job | None:
+        """The file to decode next, None when there is none."""
+        for glider in chain(self._new, self._queues):
+            queue = self._queues[glider]
+            if queue.waiting and len(queue.decoding) < AHEAD:
+                job = heapq.heappop(queue.waiting)[-1]
+                queue.decoding.append(job)
+                self._queues.move_to_end(glider)
+                self._new.pop(glider, None)
+                self.decoding += 1
+                return job
+        return None
+
+    def finish(self, job: Job, result: Segment | Exception) -> None:
+        """Note what became of a file that was being decoded."""
+        job.result = result
+        self.decoding -= 1
+
+    def decoded(self, glider: str) -> Job | None:
+        """The next file of a glider to take, which leaves: decoded, and none before it is still in work."""
+        queue = self._queues.get(glider)
+        if queue is None or not queue.decoding or queue.decoding[0].result is None:
+            return None
+        job = queue.decoding.popleft()
+        self._paths.discard(job.file.path)
+        if not queue.waiting and not queue.decoding:
+            del self._queues[glider]
+        return job
+
+    def more(self, glider: str) -> bool:
+        """Whether more files of a glider are at hand."""
+        return glider in self._queues
+
+    def behind(self, glider: str) -> int:
+        """How many more files of a glider are at hand."""
+        queue = self._queues.get(glider)
+        return 0 if queue is None else len(queue.waiting) + len(queue.decoding)
+
+
+# ----------------------------------------
+# What to do with a file that has come: let it settle; once complete, decode it, wait, or leave it alone.
+
+DONE = (Status.TAKEN, Status.DUPLICATE, Status.QUARANTINED)
+
+
+def state(path: Path) -> tuple[int, int] | None:
+    """Size (bytes) and time of change (ns) of a file; None where there is none, zeros where it is closed."""
+    try:
+        status = path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError:
+        return 0, 0
+    return status.st_size, status.st_mtime_ns
+
+
+def observe(path: Path, settling: Settling, now: float) -> None:
+    """Let a file settle that has changed; `now` is monotonic (s)."""
+    try:
+        status = path.lstat()
+    except OSError:  # gone or renamed: its new name is news of its own
+        settling.forget(path)
+        return
+    settling.observe(path, status.st_size, status.st_mtime_ns, now)
+
+
+def settle_again(path: Path, settling: Settling, now: float) -> None:
+    """Let a file settle as if nothing were known of it; `now` is monotonic (s)."""
+    settling.forget(path)
+    observe(path, settling, now)
+
+
+def lacks_depth(flight: Path, store: Store, caches: Sequence[Path]) -> bool:
+    """Whether a flight file that was looked at before, and is as it was, names no sensor of the depth."""
+    before = store.file(_text(flight))
+    if before is None or (before.size, before.mtime_ns) != state(flight):
+        return False
+    try:
+        return needs_science(read_header(flight), caches)
+    except (Quarantine, Retry):
+        return False
+
+
+def newer_science(flight: Path, store: Store) -> list[Path]:
+    """The science files beside a flight file that came after it was looked at, by this machine's clock."""
+    noted = store.noted_at(_text(flight))
+    if noted is None:
+        return []
+    try:
+        return [path for path in science_files(flight) if path.stat().st_ctime > noted]
+    except OSError:
+        return []
+
+
+def triage(
+    path: Path,
+    store: Store,
+    caches: Sequence[Path],
+    is_known: Callable[[str], bool],
+    *,
+    anew: bool = False,
+) -> Job | File | None:
+    """A job where the file is to be decoded, a row for the ledger where not, None where nothing is new.
+
+    Reads nothing but the header, which takes well under a millisecond. `anew`: also one that is done with.
+    """
+    now, before = state(path), store.file(_text(path))
+    if now is None:
+        return _gone(before, store, is_known)
+    is_same = before is not None and (before.size, before.mtime_ns) == now
+    if before is not None and is_same and not anew and _is_settled(before, caches, is_known):
+        return None
+    file = File(_text(path), *now, Status.WAITING)
+    try:
+        header = read_header(_plain(path))
+    except (Quarantine, Retry) as error:
+        return failed(file, error)
+    file = replace(file, glider=header.id.glider, segment=header.id.name, opened_at=header.id.opened_at)
+    if not is_known(header.id.glider):
+        reason = f"glider {header.id.glider} is not in the configuration"
+        return replace(file, status=Status.UNKNOWN, reason=reason)
+    if header.factored and _is_missing(header.crc, caches):
+        return failed(file, MissingCache(header.crc, caches))
+    return Job(file, header)
+
+
+def _is_settled(before: File, caches: Sequence[Path], is_known: Callable[[str], bool]) -> bool:
+    """Whether nothing more can be done for a file that has not changed."""
+    if before.status == Status.UNKNOWN:
+        return bool(before.glider) and not is_known(before.glider)
+    if before.hindrance is Hindrance.RENAMED:  # it was not read: if it comes back, it is to be
+        return False
+    return before.status in DONE or (bool(before.crc) and _is_missing(before.crc, caches))
+
+
+def _plain(path: Path) -> Path:
+    """The path, if its name can be kept. Raises Quarantine."""
+    if str(path) != _text(path):
+        raise Quarantine("its name is not UTF-8 text: give it another one")
+    return path
+
+
+def failed(file: File, error: Exception) -> File:
+    """The row of a file that could not be decoded."""
+    status, why = Status.QUARANTINED, Hindrance.DAMAGED
+    if isinstance(error, MissingCache):
+        status, why = Status.WAITING, Hindrance.NO_CACHE
+    elif isinstance(error, Retry):
+        status, why = Status.WAITING, Hindrance.UNREADABLE
+    elif isinstance(error, NotAssessed):
+        why = Hindrance.NOT_ASSESSED
+    crc = error.crc if isinstance(error, MissingCache) else ""
+    return replace(file, status=status, reason=str(error), crc=crc, hindrance=why)
+
+
+def _gone(before: File | None, store: Store, is_known: Callable[[str], bool]) -> File | None:
+    """A file that waited and is not there any more: it was renamed, or taken away."""
+    if before is None or before.status in DONE:
+        return None
+    if before.status == Status.UNKNOWN and not is_known(before.glider):
+        return None
+    if not store.segments.is_held(before.glider, before.segment):
+        reason = "is not there any more, and its segment has not come under another name"
+        return replace(before, status=Status.WAITING, reason=reason, crc="", hindrance=Hindrance.GONE)
+    return replace(before, status=Status.DUPLICATE, reason="was renamed", crc="", hindrance=Hindrance.RENAMED)
+
+
+def _is_missing(crc: str, caches: Sequence[Path]) -> bool:
+    """Whether a cache file is in none of the folders; where one cannot be read, the decoder tells why."""
+    try:
+        return not is_there(crc, caches)
+    except OSError:
+        return False
+
+
+def _text(path: Path) -> str:
+    """The path as text that can be kept, whatever bytes are in its name."""
+    return str(path).encode("utf-8", "backslashreplace").decode()
