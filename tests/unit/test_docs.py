@@ -236,7 +236,7 @@ def test_reasons_described_are_those_of_the_code() -> None:
     assert len(reasons) > 20
     code = "".join(
         path.read_text(encoding="utf-8")
-        for folder in ("navigation", "estimation", "detection")
+        for folder in ("navigation", "estimation")
         for path in (SOURCE / folder).glob("*.py")
     )
     for reason in reasons:
@@ -246,7 +246,7 @@ def test_reasons_described_are_those_of_the_code() -> None:
 
 def test_reasons_of_the_code_are_described() -> None:
     described = "\n".join(reasons_described())
-    found = words_in(SOURCE / "estimation" / "speed.py") | words_in(SOURCE / "detection" / "consistency.py")
+    found = words_in(SOURCE / "estimation" / "verdict.py")
     assert len(found) > 12
     assert [words for words in sorted(found) if words not in described] == []
 
