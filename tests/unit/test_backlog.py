@@ -15,7 +15,7 @@ DONE = Quarantine("for the sake of the test")
 
 def job(glider: str, opened_at: float, path: str = "") -> Job:
     name = f"{glider}-2024-1-0-{opened_at:.0f}"
-    header = Header(SegmentId(opened_at, glider, name), "m.mi", "sbd", "0", True, 9, 9, "1", 100)
+    header = Header(SegmentId(opened_at, glider, name), "m.mi", "sbd", "0", True, 9, 9, 100)
     return Job(File(path or f"/{name}.sbd", 1, 1, Status.WAITING, glider, name), header)
 
 

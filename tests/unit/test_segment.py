@@ -10,7 +10,7 @@ from gliderwatch.slocum.sensors import QUANTITIES, SENSORS, build_segment, depth
 
 T0 = datetime(2022, 11, 7, tzinfo=UTC).timestamp()
 HEADER = Header(
-    SegmentId(T0, "electa", "electa-2022-310-0-1"), "350_nu.mi", "sbd", "0f682cb2", True, 2709, 104, "x", 600
+    SegmentId(T0, "electa", "electa-2022-310-0-1"), "350_nu.mi", "sbd", "0f682cb2", True, 2709, 104, 600
 )
 
 

@@ -9,6 +9,10 @@ ALLOWED = {
     "low_pass_both_ways": "the delayed mode of paper 002",
     "AdaptiveInfo.n_steps": "tests count the substeps of a dive by it",
     "Assessment.parameters": "in every assessment that is written out: the hash of what was used",
+    "Group.format_commands": "click calls it",
+    "Store.clock_steps": "tests of clocks that fall back look at it",
+    "is_sent": "benchmarks/sensors.py asks which sensors a mission has",
+    "with_fault": "benchmarks/seas.py puts faults into missions by it",
     "_Warnings.emit": "logging calls it",
     "_Handler.on_any_event": "watchdog calls it",
 }
