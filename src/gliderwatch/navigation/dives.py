@@ -10,23 +10,25 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from gliderwatch.model import Dive, Fix, Segment, Unusable
+from gliderwatch.navigation.constants import (
+    FASTEST_OVER_GROUND,
+    HEADING_GAP,
+    HIDING_HOLE,
+    JUMP,
+    LONGEST_DIVE,
+    SHORTEST_DIP,
+    SHORTEST_DIVE,
+    SHORTEST_HOLE,
+    SPARSE,
+    SUSPECT_DISTANCE,
+)
 from gliderwatch.navigation.current import Known, Report, new_reports, pair, updated
 from gliderwatch.navigation.features import flight_features, track_features
-from gliderwatch.navigation.fixes import FASTEST, SUSPECT, distance, new_fixes, stays
-from gliderwatch.navigation.flight import SPARSE, Flight, find_flight, lengthened, unseen
+from gliderwatch.navigation.fixes import distance, new_fixes, stays
+from gliderwatch.navigation.flight import Flight, find_flight, lengthened, unseen
 from gliderwatch.navigation.quality import flight_notes, heading_gap, segment_notes, why_unusable
 from gliderwatch.navigation.samples import Samples, after, concatenated, get, prepare
 from gliderwatch.navigation.track import build_track
-
-SHORTEST = 900.0
-"""Seconds: a shorter stay under water says too little of speed, a shorter hole in the data is none."""
-DIP = 120.0
-"""Seconds: a stay under water this long is a dive of which the glider computes a current."""
-LONGEST = 3 * 86400.0
-"""Seconds between fixes: a longer one is not a dive but a gap between deployments."""
-HIDING = 3600.0
-"""Seconds: a hole in the data this long may hide a whole dive; in shorter ones a glider waits at the
-surface between two missions, and corrects the current of the dive before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,16 +74,16 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
     fixes = new_fixes(samples, state.fix)
     state, told = _withdraw_old_fix(state, fixes)
     untold = [state.untold] if state.untold is not None else []
-    for first, last in stays(fixes, DIP):
+    for first, last in stays(fixes, SHORTEST_DIP):
         flight = _flight_since(state, samples, first)
-        if flight is not None and flight.duration >= SHORTEST:
+        if flight is not None and flight.duration >= SHORTEST_DIVE:
             told.append(_dive(state, segment.id.glider, samples, flight, first))
-        elif flight is not None and flight.duration >= DIP:
+        elif flight is not None and flight.duration >= SHORTEST_DIP:
             untold.append(flight.end)
         holes = tuple((max(a, last.t), b) for a, b in state.holes if b > last.t)
         state = replace(state, fix=last, holder=segment.id.name, holes=holes, notes=quality)
 
-    oldest = (state.last_t or 0.0) - LONGEST
+    oldest = (state.last_t or 0.0) - LONGEST_DIVE
     carry = after(samples, max(state.fix.t, oldest) if state.fix is not None else oldest)
     under_way = _flight_since(state, carry, None)
     told, waiting = _with_currents(told, untold, under_way, [*state.reports, *reports])
@@ -90,7 +92,7 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
     later = later if later is not None and (latest is None or later > latest.t_surface) else None
     state = replace(state, carry=carry, reports=tuple(waiting), dive=latest, untold=later)
     news = [d for d in told if d is not before]
-    if under_way is not None and under_way.duration >= SHORTEST:
+    if under_way is not None and under_way.duration >= SHORTEST_DIVE:
         news.append(_dive(state, segment.id.glider, carry, under_way, None))
     return state, news
 
@@ -105,7 +107,7 @@ def _with_declination(state: Navigation, segment: Segment) -> Navigation:
     t = segment.id.opened_at
     if segment.declination_source == "glider":
         return replace(state, declination=segment.declination, declination_t=t)
-    if state.declination_t is not None and t - state.declination_t < LONGEST:
+    if state.declination_t is not None and t - state.declination_t < LONGEST_DIVE:
         return state
     return replace(state, declination=segment.declination, declination_t=None)
 
@@ -113,7 +115,7 @@ def _with_declination(state: Navigation, segment: Segment) -> Navigation:
 def _placed(state: Navigation, segment: Segment, fresh: Samples, quality: tuple[str, ...]) -> Navigation:
     """The state with the place of a segment in time: a hole before it, and whether it holds the flight."""
     holes = state.holes
-    if state.last_t is not None and segment.id.opened_at - state.last_t > SHORTEST:
+    if state.last_t is not None and segment.id.opened_at - state.last_t > SHORTEST_HOLE:
         holes = (*holes, (state.last_t, segment.id.opened_at))
     flies = find_flight(fresh, segment.id.opened_at - SPARSE, segment.last_t) is not None
     return replace(
@@ -131,7 +133,7 @@ def _withdraw_old_fix(state: Navigation, fixes: list[Fix]) -> tuple[Navigation, 
         return state, []
     if fixes and state.fix is not None and state.dive.end == state.fix:
         gap = fixes[0].t - state.fix.t
-        if gap < SHORTEST and distance(state.fix, fixes[0]) > FASTEST * gap + 100.0:
+        if gap < SHORTEST_DIVE and distance(state.fix, fixes[0]) > FASTEST_OVER_GROUND * gap + JUMP:
             withdrawn = replace(
                 state.dive,
                 end=fixes[0],
@@ -150,13 +152,17 @@ def _flight_since(state: Navigation, samples: Samples, end: Fix | None) -> Fligh
         state.fix.t if state.fix is not None else min((float(s.t[0]) for s in samples.values()), default=0.0)
     )
     last = end.t if end is not None else max((float(s.t[-1]) for s in samples.values()), default=0.0)
-    if not DIP < last - first <= LONGEST:
+    if not SHORTEST_DIP < last - first <= LONGEST_DIVE:
         return None
     flight = find_flight(samples, first, last)
-    if flight is None and state.fix is not None and (end is None or distance(state.fix, end) > SUSPECT):
-        hidden = [(a, min(b, last)) for a, b in state.holes if min(b, last) - a >= HIDING]
+    if (
+        flight is None
+        and state.fix is not None
+        and (end is None or distance(state.fix, end) > SUSPECT_DISTANCE)
+    ):
+        hidden = [(a, min(b, last)) for a, b in state.holes if min(b, last) - a >= HIDING_HOLE]
         flight = Flight(*hidden[-1], evidence="missing") if hidden else None
-        if flight is None and end is not None and last - first >= HIDING:
+        if flight is None and end is not None and last - first >= HIDING_HOLE:
             flight = unseen(samples, first, last)
     return flight
 
@@ -176,7 +182,7 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
         gap = heading_gap(samples, flight)
         features = replace(
             track_features(samples, flight, track),
-            heading_gap=gap if gap > 2 * SPARSE else None,
+            heading_gap=gap if gap > HEADING_GAP else None,
             unobserved=missing,
         )
     return Dive(

@@ -5,20 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from gliderwatch.model import DiveFeatures, Fix, Segment, Unusable
-from gliderwatch.navigation.fixes import FASTEST, distance
-from gliderwatch.navigation.flight import SPARSE, Flight
+from gliderwatch.navigation.constants import (
+    FASTEST_OVER_GROUND,
+    HEADING_GAP,
+    MOST_BLIND,
+    MOST_DRIFT,
+    MOST_UNOBSERVED,
+    STEADY_COURSE,
+    TURNED_MUCH,
+)
+from gliderwatch.navigation.fixes import distance
+from gliderwatch.navigation.flight import Flight
 from gliderwatch.navigation.samples import Samples, get
-from gliderwatch.navigation.track import CIRCLING
-
-UNOBSERVED = 0.25
-"""Share of the interval between two fixes that may be missing before a dive cannot be used."""
-BLIND = 0.8
-"""Share of a flight without any heading beyond which a dive cannot be used. Some files hold every
-third yo only: a glider on its way to a waypoint steers much the same in between."""
-STEADY = 0.9
-"""Length of the mean of the headings seen above which the glider is taken to have kept it in between."""
-SURFACE = 0.5
-"""Share of the interval between two fixes that the glider may have drifted before it cannot be used."""
 
 
 def why_unusable(
@@ -33,13 +31,13 @@ def why_unusable(
     if start is None:
         return Unusable.NO_FIX_BEFORE, "no fix before the dive"
     interval = end.t - start.t
-    if flight.evidence == "missing" or missing > UNOBSERVED * interval:
+    if flight.evidence == "missing" or missing > MOST_UNOBSERVED * interval:
         words = f"data missing: {missing / 3600:.1f} of {interval / 3600:.1f} h between two fixes"
         return Unusable.DATA_MISSING, words
-    if interval - flight.duration > SURFACE * interval:
+    if interval - flight.duration > MOST_DRIFT * interval:
         return Unusable.SURFACE_DRIFT, "mostly surface drift"
     over_ground = distance(start, end) / interval
-    if over_ground > FASTEST:
+    if over_ground > FASTEST_OVER_GROUND:
         return Unusable.WILD_FIX, f"wild fix: {over_ground:.0f} m/s over ground"
     return _blind(samples, flight)
 
@@ -47,9 +45,9 @@ def why_unusable(
 def _blind(samples: Samples, flight: Flight) -> tuple[Unusable | None, str]:
     """Why the headings of a flight do not do, and the same in words; None and empty when they do."""
     gap = heading_gap(samples, flight)
-    if gap > BLIND * flight.duration:
+    if gap > MOST_BLIND * flight.duration:
         return Unusable.NO_HEADING, f"no heading for {gap / 3600:.1f} h"
-    if gap > 2 * SPARSE and _heading_length(samples, flight) < STEADY:
+    if gap > HEADING_GAP and _heading_length(samples, flight) < STEADY_COURSE:
         return Unusable.TURNING, f"turning, and no heading for {gap / 3600:.1f} h"
     return None, ""
 
@@ -83,7 +81,7 @@ def flight_notes(flight: Flight, features: DiveFeatures) -> tuple[str, ...]:
     notes = []
     if flight.evidence == "heading":
         notes.append("no depth or pitch in the file: drift at the surface cannot be told from flight")
-    if features.heading_steadiness is not None and features.heading_steadiness < max(CIRCLING, 0.5):
+    if features.heading_steadiness is not None and features.heading_steadiness < TURNED_MUCH:
         notes.append("the glider turned much: its speed is hardly observable")
     if features.heading_gap is not None:
         notes.append(f"no heading for {features.heading_gap / 3600:.1f} h of the dive: taken as steady")

@@ -15,15 +15,10 @@ from typing import Protocol
 from gliderwatch.alerts import message
 from gliderwatch.model import Alert, Assessment, Expected, Incident
 from gliderwatch.rules.acknowledged import Acks
+from gliderwatch.rules.constants import FLOW_CHANGE, NEWS, SPEED_CHANGE
 from gliderwatch.rules.overdue import Silence
 from gliderwatch.rules.unknown import Unknown
 
-NEWS = 86400.0
-"""Seconds: an incident that was over for longer when it became known is history, not news."""
-SPEED_CHANGE = 0.05
-"""m/s: a smaller change of a speed that was told is not worth a correction."""
-FLOW_CHANGE = 0.05
-"""m/s: the same for the reference flow."""
 NO_ACKS: Acks = MappingProxyType({})
 
 

@@ -12,6 +12,7 @@ from enum import StrEnum
 
 from gliderwatch.model import Assessment, Flag, Incident, Kind
 from gliderwatch.params import AnomalyRule, FalseAlarmRule, RuleParams
+from gliderwatch.rules.constants import SEVERE
 
 
 class Phase(StrEnum):
@@ -94,7 +95,7 @@ def _says_of_anomaly(dive: Assessment) -> bool | None:
 
 def is_severe(dive: Assessment) -> bool:
     """Whether the speed is below half of the lower bound of the normal range."""
-    return dive.speed is not None and dive.speed < dive.speed_min / 2
+    return dive.speed is not None and dive.speed < SEVERE * dive.speed_min
 
 
 def departure(dive: Assessment, kind: Kind) -> float:

@@ -13,8 +13,8 @@ from typing import Protocol
 from gliderwatch.alerts import overdue as message
 from gliderwatch.alerts.overdue import Absence, Fleet
 from gliderwatch.model import Alert, Assessment, Expected, Incident, Severity
+from gliderwatch.rules.constants import GONE, LATER_CALL, MESSAGE_LATE, RECENT
 from gliderwatch.rules.silence import (
-    GONE,
     Awaited,
     Sign,
     awaited,
@@ -25,12 +25,6 @@ from gliderwatch.rules.silence import (
     is_launched,
     severity,
 )
-
-LATE = 900.0
-"""Seconds: a message made later than that after its time tells of now (the service was off), an earlier one
-of its time, so that live and replay say the same."""
-RECENT = GONE + 2 * 86400.0
-"""Seconds: files opened before are no sign of life of the last 30 days."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +109,7 @@ def tick(
     if stages <= silence.told:
         return silences, alerts
     since = silence.awaited.stage(stages - 1)
-    absence = _absence(silence.awaited, known, fleet, since if now - since < LATE else now)
+    absence = _absence(silence.awaited, known, fleet, since if now - since < MESSAGE_LATE else now)
     alert = message.overdue(
         absence,
         alert_id=f"{silence.id}/{silence.messages}",
@@ -171,7 +165,7 @@ def _absence(call: Awaited, known: Known, fleet: Fleet, now: float) -> Absence:
         expected = Expected(call.heard, call.t, 0.0, None, None, 0.0, 0.0, 0.0, "")
     place = _both(last.lat, last.lon) if last is not None else None
     flow = _both(*message.current(last)) if last is not None else None
-    foreseen = expected if call.heard <= expected.after + call.interval / 2 else None
+    foreseen = expected if call.heard <= expected.after + LATER_CALL * call.interval else None
     return Absence(
         glider=known.glider,
         now=now,

@@ -15,9 +15,9 @@ from gliderwatch.alerts.words import duration, utc
 from gliderwatch.config import Config
 from gliderwatch.config.service import Operator as Settings
 from gliderwatch.model import Alert, Severity
+from gliderwatch.rules.constants import GONE
 from gliderwatch.rules.muting import with_mute
 from gliderwatch.rules.overdue import outlook
-from gliderwatch.rules.silence import GONE
 from gliderwatch.run.posting import post_alert
 from gliderwatch.run.speaking import Waits, waits
 from gliderwatch.store.sqlite import Store

@@ -21,7 +21,7 @@ from gliderwatch.ingest.decode import Decoder
 from gliderwatch.ingest.header import read_header
 from gliderwatch.model import Alert, Hindrance, Segment
 from gliderwatch.params import GliderParams
-from gliderwatch.rules.silence import GONE
+from gliderwatch.rules.constants import GONE
 from gliderwatch.run import arrivals, intake
 from gliderwatch.run.backlog import Job
 from gliderwatch.run.intake import Speaking

@@ -11,9 +11,9 @@ from gliderwatch.config import Config
 from gliderwatch.model import Assessment, Expected, Incident
 from gliderwatch.params import Attention
 from gliderwatch.rules.acknowledged import Acks
+from gliderwatch.rules.constants import GONE, RECENT
 from gliderwatch.rules.muting import with_mute
-from gliderwatch.rules.overdue import RECENT
-from gliderwatch.rules.silence import GONE, Awaited, awaited, guess, is_launched
+from gliderwatch.rules.silence import Awaited, awaited, guess, is_launched
 from gliderwatch.run.life import STALE, is_held, silence
 from gliderwatch.run.lines import assessment_line, iso
 from gliderwatch.run.manage.incidents import ack_json
