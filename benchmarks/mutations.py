@@ -34,12 +34,13 @@ assert np
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "src" / "gliderwatch"
 TESTS = {
-    "navigation": "unit/test_heuristics_navigation unit/test_current unit/test_dives unit/test_features unit/test_fixes unit/test_flight"
-    " unit/test_samples unit/test_track",
-    "forecast": "unit/test_heuristics_forecast unit/test_forecast_flow unit/test_forecast_steering unit/test_forecast_surfacing"
-    " unit/test_forecast_timing unit/test_forecast_waypoints"
+    "navigation": "unit/test_heuristics_navigation unit/test_current unit/test_dives unit/test_features"
+    " unit/test_fixes unit/test_flight unit/test_samples unit/test_track",
+    "forecast": "unit/test_heuristics_forecast unit/test_forecast_flow unit/test_forecast_steering"
+    " unit/test_forecast_surfacing unit/test_forecast_timing unit/test_forecast_waypoints"
     " property/test_forecast",
-    "rules": "unit/test_heuristics_rules unit/test_announce unit/test_incident unit/test_silence unit/test_unknown unit/test_waiting",
+    "rules": "unit/test_heuristics_rules unit/test_announce unit/test_incident unit/test_silence"
+    " unit/test_unknown unit/test_waiting",
 }
 """The fast tests of each room."""
 CHANGES = {"half": 0.5, "double": 2.0}

@@ -93,7 +93,5 @@ FIRST_MISSES_WEIGHT = 0.4
 """The weight of each of them, in dives."""
 MISSES_MEMORY = 0.95
 """What is left of the weight of a miss after each further dive."""
-LEAST_STRETCH = 0.4
-"""The least factor on the axes of the ellipse."""
 MOST_STRETCH = 4.0
-"""And the greatest."""
+"""The greatest factor on the axes of the ellipse; the least follows from the first misses and is 0.7."""

@@ -13,7 +13,6 @@ from gliderwatch.forecast.constants import (
     DOUBT,
     FIRST_MISSES,
     FIRST_MISSES_WEIGHT,
-    LEAST_STRETCH,
     MISSES_MEMORY,
     MOST_STRETCH,
     SAME_WAYPOINT,
@@ -95,4 +94,4 @@ def factor(misses: Sequence[float]) -> float:
     ``misses`` are the distances from the places expected, in parts of the ellipse as reckoned.
     """
     found = quantile(misses, FIRST_MISSES, FIRST_MISSES_WEIGHT, MISSES_MEMORY)
-    return min(max(found, LEAST_STRETCH), MOST_STRETCH)
+    return min(found, MOST_STRETCH)
