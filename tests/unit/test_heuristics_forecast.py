@@ -6,15 +6,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gliderwatch.estimation.adaptive import AdaptiveState
+from gliderwatch.estimation.glider import Estimate
+from gliderwatch.estimation.learner import Learner
 from gliderwatch.forecast import timing
 from gliderwatch.forecast.learning import is_unseen, learn
+from gliderwatch.forecast.outlook import look_ahead
 from gliderwatch.forecast.state import Surfacings, factor, is_same
 from gliderwatch.forecast.steering import Plan, courses
 from gliderwatch.forecast.surfacing import expect
 from gliderwatch.forecast.waypoints import bound_for, heard
 from gliderwatch.model import Current, Expected, Fix
 from gliderwatch.navigation.frame import from_plane, to_plane
-from joint_support import HOUR, LAT, LON, START, Way, dive, mission
+from joint_support import DAY, HOUR, LAT, LON, START, Way, dive, mission
 from missions import segment
 
 SPEED = 0.25
@@ -130,6 +134,30 @@ class TestWhere:
         state = replace(NORTH, current=(0.0, 0.0))
         wild = replace(dive(1, Way(), start=FIX), current=Current(2.0, 0.0, True))
         assert learn(state, wild, None).change == pytest.approx((0.8 + 0.2 * 9) * state.change)
+
+
+class TestOutlook:
+    """Of the learner, which gives no errors of its own: speed 0.3 m/s, a current of 0.1 m/s to the east."""
+
+    LOOK = look_ahead(
+        Estimate(
+            learner=Learner(
+                learner=AdaptiveState(np.zeros(2), np.zeros(2), np.zeros((2, 1)), 0.3, np.zeros((3, 3)), 1.0),
+                current=Current(0.1, 0.0, True),
+                current_t=START,
+            )
+        ),
+        None,
+    )
+
+    def test_its_speed_is_good_to_a_tenth(self):
+        assert self.LOOK[:2] == pytest.approx((0.3, 0.03))
+
+    def test_the_current_lasts_and_after_days_it_has_changed_by_its_usual_size(self):
+        mean, soon = self.LOOK[2](START, START + 60.0)
+        _, late = self.LOOK[2](START + 30 * DAY, START + 30 * DAY)
+        assert mean.tolist() == [0.1, 0.0]
+        assert soon[0, 0] < 1e-5 and late[0, 0] == pytest.approx(0.08**2)
 
 
 class TestDrift:
