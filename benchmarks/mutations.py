@@ -22,14 +22,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 # Loaded once here and inherited by each process; gliderwatch itself is not, as each process has its own.
-import hypothesis
-import msgspec
-import numpy as np
+import hypothesis  # noqa: F401
+import msgspec  # noqa: F401
+import numpy as np  # noqa: F401
 import pytest
-
-assert hypothesis
-assert msgspec
-assert np
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "src" / "gliderwatch"
@@ -95,9 +91,8 @@ def tests(change: Change) -> list[str]:
         if change.name in {alias.name for alias in node.names}
     ]
     files = [ROOT / "tests" / f"{name}.py" for name in TESTS[change.room].split()]
-    present = [(path, path.read_text(encoding="utf-8")) for path in files if path.exists()]
-    present.sort(key=lambda file: not any(user in file[1] for user in users))
-    return [str(path) for path, _ in present]
+    texts = {path: path.read_text(encoding="utf-8") for path in files}
+    return sorted(map(str, files), key=lambda path: not any(user in texts[Path(path)] for user in users))
 
 
 class FirstFailure:
@@ -129,7 +124,8 @@ def first_failure(change: Change) -> str:
             )
             assert before is not None
             after = f"{change.name} = {changed(change.value, change.how)}"
-            page.write_text(text.replace(f"{before}\n", f"{after}\n", 1), encoding="utf-8")
+            assert f"\n{before}\n" in text and after != before, f"{change.name} can not be changed"
+            page.write_text(text.replace(f"\n{before}\n", f"\n{after}\n", 1), encoding="utf-8")
         sys.path.insert(0, folder)
         os.chdir(ROOT)
         seen = FirstFailure()
@@ -157,9 +153,8 @@ def main() -> int:
     ]
     survived = 0
     with multiprocessing.get_context("fork").Pool(given.jobs, maxtasksperchild=1) as pool:
-        for room, failure in zip(
-            rooms, pool.map(first_failure, [Change(r, "", "") for r in rooms], 1), strict=True
-        ):
+        unchanged = [Change(room, "", "") for room in rooms]
+        for room, failure in zip(rooms, pool.imap(first_failure, unchanged), strict=True):
             if failure:
                 print(f"{room}: the tests fail without any change: {failure}")
                 return 2
