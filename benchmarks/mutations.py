@@ -129,7 +129,7 @@ def first_failure(change: Change) -> str:
         sys.path.insert(0, folder)
         os.chdir(ROOT)
         seen = FirstFailure()
-        options = ["-x", "-q", "-p", "no:cacheprovider", "-o", "timeout=120"]
+        options = ["-x", "-q", "-p", "no:cacheprovider", "-o", "timeout=60"]
         with Path(os.devnull).open("w") as null, redirect_stdout(null), redirect_stderr(null):
             code = pytest.main([*options, *tests(change)], plugins=[seen])
         assert sys.modules["gliderwatch"].__path__[0].startswith(folder), "the copy was not tested"

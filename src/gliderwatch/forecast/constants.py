@@ -9,7 +9,7 @@ it is for. How a current changes is `estimation.flow.FlowParams`.
 HABIT_DIVES = 5
 """Dives that show habits: times at the surface, lengths of the mean heading vector."""
 MISSES_KEPT = 30
-"""Errors of time and of place that are remembered; with `ERROR_MEMORY` the older ones weigh under 8 %."""
+"""Errors of time and of place that are remembered; with `ERROR_MEMORY` the oldest weighs 8 %."""
 WAYPOINTS_KEPT = 16
 """Waypoints of the past that are remembered, so that the next one of a round is known."""
 WAYPOINTS_HEARD = 32
@@ -29,7 +29,7 @@ LATEST_AGAIN = 2
 ERROR_MEMORY = 0.92
 """What is left of the weight of an error of time after each further dive: a dozen dives."""
 FIRST_ERRORS = (0.01, 0.02, 0.04, 0.12, 0.6)
-"""Errors (logarithm of a ratio) that stand for those of missions in general: the five real ones."""
+"""Errors (logarithm of a ratio) that stand for those of missions in general."""
 FIRST_WEIGHT = 0.2
 """The weight of each of them, in dives."""
 LONGEST_ERROR = 1.0

@@ -12,7 +12,7 @@ FULL_POWER = 24.0
 """W of a thruster that is fully on. Power goes with the square of the setting: electa-2022, 2.9 W at 35 % and
 8.6 W at 60 %."""
 SPARSE = 1800.0
-"""s: the coarsest cadence of a real-time file (usf-sam-2019); samples further apart leave a hole."""
+"""s: the coarsest cadence of a real-time file; samples further apart leave a hole."""
 
 # Fixes
 FASTEST_OVER_GROUND = 3.0
@@ -54,7 +54,7 @@ CURRENT_EARLY = 120.0
 """s that a current may be published before the last sample under water."""
 CURRENT_CORRECTED = 600.0
 """s after a surfacing: what is first published later is not the first estimate any more. Corrections come 10
-to 40 min after the surfacing (maria-2022, usf-sam-2019)."""
+to 40 min after the surfacing."""
 SAME_CURRENT = 1e-6
 """m/s: currents that differ by less are one value, written with other digits."""
 
