@@ -8,8 +8,10 @@ and a dive is told again when more of it is known.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
-from gliderwatch.model import Dive, Fix, Segment, Unusable
+from gliderwatch.model import Dive, Fix, Segment, Series, Unusable, readonly
+from gliderwatch.navigation.clock import forward_step
 from gliderwatch.navigation.constants import (
     FASTEST_OVER_GROUND,
     HEADING_GAP,
@@ -26,7 +28,14 @@ from gliderwatch.navigation.current import Known, Report, new_reports, pair, upd
 from gliderwatch.navigation.features import flight_features, track_features
 from gliderwatch.navigation.fixes import distance, new_fixes, stays
 from gliderwatch.navigation.flight import Flight, find_flight, lengthened, unseen
-from gliderwatch.navigation.quality import flight_notes, heading_gap, segment_notes, why_unusable
+from gliderwatch.navigation.pressure import zeroed
+from gliderwatch.navigation.quality import (
+    corrected_notes,
+    flight_notes,
+    heading_gap,
+    segment_notes,
+    why_unusable,
+)
 from gliderwatch.navigation.samples import Samples, after, concatenated, get, prepare
 from gliderwatch.navigation.track import build_track
 
@@ -40,7 +49,8 @@ class Navigation:
     latest segment (s); ``holes`` the times (start, end) since the fix of which no segment has come;
     ``holder`` the segment that holds the flight since the fix; ``known`` the currents reported last and
     ``reports`` those whose dive is not told yet; ``dive`` the last whole dive, ``untold`` the
-    surfacing (s) of a later one that is not told; ``notes`` on the data since the fix.
+    surfacing (s) of a later one that is not told; ``notes`` on the data since the fix; ``latest`` the name of
+    the latest segment; ``surface_depth`` what the depth sensor shows at the surface (m; 0: near enough).
     """
 
     fix: Fix | None = None
@@ -55,6 +65,8 @@ class Navigation:
     dive: Dive | None = None
     untold: float | None = None
     notes: tuple[str, ...] = ()
+    latest: str = ""
+    surface_depth: float = 0.0
 
 
 def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]:
@@ -65,9 +77,13 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
     """
     state = _with_declination(state, segment)
     fresh = prepare(segment, state.declination or 0.0)
+    state, ahead = _with_clock(state, segment, fresh)
+    fresh, surface = zeroed(fresh, state.fix, state.surface_depth)
+    state = replace(state, surface_depth=surface)
     samples = concatenated(state.carry, fresh)
     reports, known = new_reports(segment, state.declination or 0.0, state.known)
     quality = segment_notes(segment, state.declination, from_model=state.declination_t is None)
+    quality += corrected_notes(ahead, surface)
     state = replace(_placed(state, segment, fresh, quality), known=known)
 
     before = state.dive
@@ -124,7 +140,25 @@ def _placed(state: Navigation, segment: Segment, fresh: Samples, quality: tuple[
         notes=tuple(dict.fromkeys(state.notes + quality)),
         last_t=max(segment.last_t, state.last_t or segment.last_t),
         holder=segment.id.name if flies or not state.holder else state.holder,
+        latest=segment.id.name,
     )
+
+
+def _with_clock(state: Navigation, segment: Segment, fresh: Samples) -> tuple[Navigation, float]:
+    """The state by the clock of a segment, where that was set forward before it, and by how much (s).
+
+    Nothing comes between two segments of consecutive numbers. Where the glider was at the surface at the end
+    of one and at the beginning of the next, and near enough, the hours between the two are none.
+    """
+    step = forward_step(
+        state.latest, state.last_t, state.fix, segment.id, next(iter(new_fixes(fresh, state.fix)), None)
+    )
+    if not step or state.fix is None or state.last_t is None:
+        return state, 0.0
+    carry = {name: Series(readonly(s.t + step), s.v) for name, s in state.carry.items()}
+    holes = tuple((a + step, b + step) for a, b in state.holes)
+    fix, last_t = replace(state.fix, t=state.fix.t + step), state.last_t + step
+    return replace(state, fix=fix, last_t=last_t, carry=MappingProxyType(carry), holes=holes), step
 
 
 def _withdraw_old_fix(state: Navigation, fixes: list[Fix]) -> tuple[Navigation, list[Dive]]:

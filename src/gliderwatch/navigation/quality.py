@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gliderwatch.model import DiveFeatures, Fix, Segment, Unusable
+from gliderwatch.navigation.clock import span
 from gliderwatch.navigation.constants import (
     FASTEST_OVER_GROUND,
     HEADING_GAP,
@@ -67,12 +68,24 @@ def _heading_length(samples: Samples, flight: Flight) -> float:
 def segment_notes(segment: Segment, declination: float | None, from_model: bool) -> tuple[str, ...]:
     """Notes on the data of one segment; `declination` (rad) is the one used, perhaps `from_model`."""
     notes = [f"{n} values of {name} out of range dropped" for name, n in sorted(segment.dropped.items())]
+    notes += segment.notes
     if declination is None:
         notes.append("magnetic declination unknown: headings and currents are relative to magnetic north")
     elif from_model and segment.declination is not None:
         notes.append(f"magnetic declination from the model {segment.declination_source}")
     if not len(segment.get("heading")) and len(segment.get("heading_commanded")):
         notes.append("commanded heading used, the measured one is not in the file")
+    return tuple(notes)
+
+
+def corrected_notes(ahead: float, surface: float) -> tuple[str, ...]:
+    """Notes on a clock that was set ``ahead`` (s), and on a depth sensor that shows ``surface`` (m) at the
+    surface; 0: neither."""
+    notes = []
+    if ahead:
+        notes.append(f"the glider's clock was set forward by {span(ahead)}, or it stayed at the surface")
+    if surface:
+        notes.append(f"depth is {surface:.1f} m at the surface: taken off (the pressure was not zeroed)")
     return tuple(notes)
 
 

@@ -40,13 +40,15 @@ class Said:
     """What people have been told of one glider.
 
     ``surfaced`` is the surfacing of the last notice (s), ``silences`` what was told of its staying away
-    (`rules.overdue`), ``unknown`` of dives that could not be judged (`rules.unknown`).
+    (`rules.overdue`), ``unknown`` of dives that could not be judged (`rules.unknown`), ``irregularities``
+    the ids of those of its files.
     """
 
     threads: tuple[Thread, ...] = ()
     surfaced: float | None = None
     silences: tuple[Silence, ...] = ()
     unknown: Unknown | None = None
+    irregularities: tuple[str, ...] = ()
 
 
 class Known(Protocol):

@@ -51,6 +51,16 @@ class Sign:
     last_t: float | None
     at: float
 
+    def life(self, interval: float, watched: float) -> float:
+        """When the glider was alive by this file, whatever its clock says.
+
+        A file that came days after its date, when the glider was heard since `watched` (s), has a wrong clock
+        or was sent once more: either way it was sent now. An archive that is read at the first start
+        is history.
+        """
+        t = self.time(interval)
+        return self.at if self.at - t > FRESH and self.at - watched > interval else t
+
     def time(self, interval: float) -> float:
         """When the glider sent it, at the latest: after its last sample, one `interval` after its opening
         where it breaks off or cannot be read; never after it came."""
@@ -119,9 +129,11 @@ def awaited(expected: Expected, signs: Iterable[Sign], now: float, overdue_hours
     cache, a dive without a fix) puts the next one off: one interval from there.
     """
     signs, interval = tuple(signs), expected.t - expected.after
-    heard = max([expected.after, *(t for t in (s.time(interval) for s in signs) if t <= now)])
+    watched = min((s.at for s in signs), default=now)
+    heard = max([expected.after, *(t for t in (s.life(interval, watched) for s in signs) if t <= now)])
     t = heard + interval if heard > expected.after + LATER_CALL * interval else expected.t
-    return Awaited(heard, t, t + margin(expected, signs, now, overdue_hours), interval)
+    recent = (s for s in signs if now - s.opened_at <= GONE + FRESH)
+    return Awaited(heard, t, t + margin(expected, recent, now, overdue_hours), interval)
 
 
 def is_at_sea(signs: Iterable[Sign], interval: float, now: float) -> bool:
@@ -146,8 +158,9 @@ def first_call(after: Awaited, signs: Iterable[Sign], surfacing: float | None, n
 
     What belongs to the call last heard may come up to a quarter of an interval later.
     """
-    late = after.heard + SAME_CALL * after.interval
-    times = [s.time(after.interval) for s in signs] + ([] if surfacing is None else [surfacing])
+    late, signs = after.heard + SAME_CALL * after.interval, tuple(signs)
+    watched = min((s.at for s in signs), default=now)
+    times = [s.life(after.interval, watched) for s in signs] + ([] if surfacing is None else [surfacing])
     return min((t for t in times if (t > late or t == surfacing) and t <= now), default=None)
 
 
