@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from announcing import HOUR, STEP, Talk, World, dive
-from gliderwatch.incidents.notifications import FLOW_CHANGE, NEWS, SPEED_CHANGE
+from gliderwatch.incidents.constants import FLOW_CHANGE, NEWS, SPEED_CHANGE
 from gliderwatch.model import Kind
 
 LETTERS = "0011122S-"

@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from announcing import HOUR, STEP, Talk, World, dive
-from gliderwatch.incidents.notifications import NEWS, NotificationState
+from gliderwatch.incidents.constants import NEWS
+from gliderwatch.incidents.notifications import NotificationState
 from gliderwatch.model import NextSurfacing, Severity, Unusable
 
 

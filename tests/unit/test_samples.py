@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from gliderwatch.model import Series, readonly
-from gliderwatch.navigation.samples import SPACING, after, concatenated, downsample, get, joined, prepare
+from gliderwatch.navigation.constants import SPACING
+from gliderwatch.navigation.samples import after, concatenated, downsample, get, joined, prepare
 from missions import segment, series
 
 

@@ -13,7 +13,8 @@ from gliderwatch.cli.manage import known_glider
 from gliderwatch.config import Config, expand
 from gliderwatch.config.fields import is_folder
 from gliderwatch.errors import GliderwatchError, Quarantine, StateError
-from gliderwatch.incidents.notifications import SPEED_CHANGE, as_notified
+from gliderwatch.incidents.constants import SPEED_CHANGE
+from gliderwatch.incidents.notifications import as_notified
 from gliderwatch.messages.formatting import clean, utc
 from gliderwatch.model import Assessment, Flag, Incident, Segment, SegmentId
 from gliderwatch.service import transaction, triage

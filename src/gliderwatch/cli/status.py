@@ -10,8 +10,9 @@ from typing import Any
 from gliderwatch.cli.incident_list import ack_json
 from gliderwatch.config import Config, Link, linked_gliders
 from gliderwatch.incidents.acknowledgement import Acks, with_mute
+from gliderwatch.incidents.constants import GONE, RECENT
 from gliderwatch.incidents.irregularities import Irregularity
-from gliderwatch.incidents.overdue import GONE, RECENT, ExpectedCall, expected_call, guess, is_launched
+from gliderwatch.incidents.overdue import ExpectedCall, expected_call, guess, is_launched
 from gliderwatch.model import Assessment, Incident, NextSurfacing
 from gliderwatch.params import Attention
 from gliderwatch.service.jsonl import assessment_line, iso

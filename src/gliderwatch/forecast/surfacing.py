@@ -11,7 +11,38 @@ import numpy as np
 
 from gliderwatch.estimation.dive_measurement import are_apart
 from gliderwatch.forecast import timing
-from gliderwatch.forecast.steering import SLOWEST, WAYS, Plan, courses
+from gliderwatch.forecast.constants import (
+    ALIKE,
+    CHI2_COVERED,
+    COMMUNICATION,
+    CURRENT_CHANGE,
+    DIVE_MEMORY,
+    DOUBT,
+    DRIFT_GAIN,
+    FASTEST,
+    FASTEST_DRIFT,
+    FIRST_MISSES,
+    FIRST_MISSES_WEIGHT,
+    FLOORS,
+    GPS_ERROR,
+    HABIT_DIVES,
+    INTERVALS_KEPT,
+    LONG_DRIFT,
+    MISSES_KEPT,
+    MISSES_MEMORY,
+    MOST_AT_SURFACE,
+    MOST_STRETCH,
+    SAME_WAYPOINT,
+    SLOWEST,
+    STEADY_HEADING,
+    UNSEEN,
+    WAYPOINT_LATE,
+    WAYPOINTS_HEARD,
+    WAYPOINTS_KEPT,
+    WILD_CHANGE,
+    WORST_COURSE,
+)
+from gliderwatch.forecast.steering import WAYS, Plan, courses
 from gliderwatch.forecast.timing import quantile
 from gliderwatch.model import Array, Dive, Fix, NextSurfacing, Segment, Unusable
 from gliderwatch.navigation.geodesy import displacement, from_plane
@@ -24,22 +55,6 @@ Place = tuple[float, float]
 """Latitude and longitude (degrees)."""
 Vector = tuple[float, float]
 """East and north."""
-
-DOUBT = 0.1
-"""Mean square error of a course before any dive, in parts of the speed squared."""
-CHANGE = 0.06
-"""m/s, a component: by how much a current differs from the one before, before it is known."""
-MISSES, MISSES_WEIGHT, MISSES_MEMORY = (0.3, 0.5, 0.7, 0.9, 1.2), 0.4, 0.95
-"""Distances from the place expected (parts of the 95 % ellipse) that stand for those of missions in general,
-the weight of each, and what is left of the weight of one made after each further dive."""
-LEAST, MOST = 0.4, 4.0
-"""Bounds of the factor on the axes of the ellipse."""
-CHI2 = 5.991
-"""95 % of squared distances in a plane, in standard errors, are below this."""
-NEAR = 200.0
-"""Metres: waypoints nearer than this are the same one, told with other decimals."""
-FAR = 0.01
-"""Degrees of latitude that are more than that for sure."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +80,7 @@ class Surfacings:
     lengths: tuple[float, ...] = ()
     speed: float | None = None
     current: Vector | None = None
-    change: float = CHANGE**2
+    change: float = CURRENT_CHANGE**2
     bearing: float | None = None
     waypoints: tuple[Place, ...] = ()
     scores: tuple[float, ...] = (DOUBT,) * len(WAYS)
@@ -78,7 +93,7 @@ def is_same(a: Place, b: Place) -> bool:
     >>> is_same((38.3892, -73.5), (38.389, -73.5)), is_same((38.38, -73.5), (38.389, -73.5))
     (True, False)
     """
-    return abs(a[0] - b[0]) < FAR and (a == b or float(np.hypot(*displacement(*a, *b))) < NEAR)
+    return a == b or float(np.hypot(*displacement(*a, *b))) < SAME_WAYPOINT
 
 
 def goals(state: Surfacings) -> tuple[Array, ...]:
@@ -107,8 +122,8 @@ def factor(misses: Sequence[float]) -> float:
 
     ``misses`` are the distances from the places expected, in parts of the ellipse as reckoned.
     """
-    found = quantile(misses, MISSES, MISSES_WEIGHT, MISSES_MEMORY)
-    return min(max(found, LEAST), MOST)
+    found = quantile(misses, FIRST_MISSES, FIRST_MISSES_WEIGHT, MISSES_MEMORY)
+    return min(found, MOST_STRETCH)
 
 
 # ----------------------------------------
@@ -116,11 +131,6 @@ def factor(misses: Sequence[float]) -> float:
 
 WaypointLog = tuple[tuple[float, float, float], ...]
 """Waypoints as they were told: time (s), latitude and longitude (degrees), in order of time."""
-
-KEPT = 32
-"""Reports that are remembered: a corrected dive asks for the waypoint of some hours ago."""
-LATE = 300.0
-"""Seconds after a fix in which a file that ends with it may still tell the waypoint."""
 
 
 def read_waypoints(known: WaypointLog, segment: Segment) -> WaypointLog:
@@ -131,7 +141,7 @@ def read_waypoints(known: WaypointLog, segment: Segment) -> WaypointLog:
     for report in sorted({*known, *told}):
         if not out or report[1:] != out[-1][1:]:
             out.append(report)
-    return tuple(out[-KEPT:])
+    return tuple(out[-WAYPOINTS_HEARD:])
 
 
 def active_waypoint(known: WaypointLog, t: float) -> Place | None:
@@ -140,27 +150,12 @@ def active_waypoint(known: WaypointLog, t: float) -> Place | None:
     >>> bound_for(((0.0, 27.0, -84.0), (9000.0, 27.5, -84.0)), 8000.0)
     (27.0, -84.0)
     """
-    before = [(lat, lon) for told, lat, lon in known if told <= t + LATE]
+    before = [(lat, lon) for told, lat, lon in known if told <= t + WAYPOINT_LATE]
     return before[-1] if before else None
 
 
 # ----------------------------------------
 # What a dive teaches of the next surfacing.
-
-FEW, MANY, HELD = 5, 30, 16
-"""Dives that tell habits, dives that tell errors, and waypoints of the past that are remembered."""
-MEMORY, WORST = 0.8, 2.0
-"""What is left of the score of a way of steering after each further dive; greatest square that counts."""
-CALM = 0.1
-"""Weight of the latest drift at the surface, and of `LONG_DRIFT` at least (s)."""
-LONG_DRIFT, FASTEST_DRIFT = 300.0, 1.0
-"""Seconds between two fixes that tell a drift; m/s beside the current that it is at most."""
-STEADY = 0.3
-"""Length of the mean heading vector from which the speed of a dive shows."""
-SLOWEST_LEG, FASTEST = 0.05, 1.5
-"""Bounds of the speed (m/s) that a glider believes."""
-UNSEEN = 1800.0
-"""s without data in which a glider may have been up."""
 
 
 def learn(
@@ -216,9 +211,9 @@ def _timed(state: Surfacings, dive: Dive, end: Fix) -> Surfacings:
         errors = (*errors, timing.error(interval, timing.usual(state.intervals)))
     return replace(
         known,
-        intervals=(*state.intervals, interval)[-timing.KEPT :],
-        errors=errors[-MANY:],
-        surface=(*state.surface, max(dive.t_dive - state.fix.t, 0.0))[-FEW:],
+        intervals=(*state.intervals, interval)[-INTERVALS_KEPT:],
+        errors=errors[-MISSES_KEPT:],
+        surface=(*state.surface, max(dive.t_dive - state.fix.t, 0.0))[-HABIT_DIVES:],
     )
 
 
@@ -234,8 +229,8 @@ def _scores(state: Surfacings, dive: Dive, end: Fix) -> tuple[float, ...]:
     really = (over_ground - met) / speed
     made, scores = courses(plan(state, speed, known), max(end.t - state.fix.t, 1.0)), []
     for score, course in zip(state.scores, made, strict=True):
-        part = (1 - MEMORY) * (1 - course.unknown)
-        square = min(float(np.sum((course.heading - really) ** 2)), WORST)
+        part = (1 - DIVE_MEMORY) * (1 - course.unknown)
+        square = min(float(np.sum((course.heading - really) ** 2)), WORST_COURSE)
         scores.append((1 - part) * score + part * square)
     return tuple(scores)
 
@@ -248,14 +243,14 @@ def _misses(state: Surfacings, dive: Dive, end: Fix, expected: NextSurfacing | N
         return state.misses
     off = displacement(end.lat, end.lon, expected.lat, expected.lon)
     cov = np.array([[expected.east, expected.cross], [expected.cross, expected.north]])
-    distance = math.sqrt(float(off @ np.linalg.solve(cov, off)) / CHI2) * factor(state.misses)
-    return (*state.misses, distance)[-MANY:]
+    distance = math.sqrt(float(off @ np.linalg.solve(cov, off)) / CHI2_COVERED) * factor(state.misses)
+    return (*state.misses, distance)[-MISSES_KEPT:]
 
 
 def _waypoints(known: tuple[Place, ...], told: Place | None) -> tuple[Place, ...]:
     if told is None or (known and is_same(known[-1], told)):
         return known
-    return (*known, told)[-HELD:]
+    return (*known, told)[-WAYPOINTS_KEPT:]
 
 
 def _flown(state: Surfacings, dive: Dive) -> Surfacings:
@@ -264,7 +259,9 @@ def _flown(state: Surfacings, dive: Dive) -> Surfacings:
         return state
     dt = np.diff(dive.track.t)
     east, north = (dt @ dive.track.heading / dt.sum()).tolist()
-    return replace(state, heading=(east, north), lengths=(*state.lengths, math.hypot(east, north))[-FEW:])
+    return replace(
+        state, heading=(east, north), lengths=(*state.lengths, math.hypot(east, north))[-HABIT_DIVES:]
+    )
 
 
 def _adrift(state: Surfacings, before: Fix | None, dive: Dive) -> Surfacings:
@@ -276,7 +273,9 @@ def _adrift(state: Surfacings, before: Fix | None, dive: Dive) -> Surfacings:
         return state
     moved = displacement(dive.start.lat, dive.start.lon, before.lat, before.lon)
     beside = moved / time - state.current  # that of the dive before
-    east, north = (1 - CALM) * np.array(state.drift) + CALM * np.clip(beside, -FASTEST_DRIFT, FASTEST_DRIFT)
+    east, north = (1 - DRIFT_GAIN) * np.array(state.drift) + DRIFT_GAIN * np.clip(
+        beside, -FASTEST_DRIFT, FASTEST_DRIFT
+    )
     return replace(state, drift=(float(east), float(north)))
 
 
@@ -287,13 +286,13 @@ def _driven(state: Surfacings, dive: Dive) -> Surfacings:
     current, change = (dive.current.u, dive.current.v), state.change
     if state.current is not None:
         square = math.dist(current, state.current) ** 2 / 2
-        change = MEMORY * change + (1 - MEMORY) * min(square, 9 * change)
+        change = DIVE_MEMORY * change + (1 - DIVE_MEMORY) * min(square, WILD_CHANGE * change)
     state = replace(state, current=current, change=change)
     over_ground, heading = ground(dive), np.array(state.heading or (0.0, 0.0))
-    if dive.track is None or over_ground is None or np.hypot(*heading) < STEADY:
+    if dive.track is None or over_ground is None or np.hypot(*heading) < STEADY_HEADING:
         return state
     own = float((over_ground - current) @ heading / (heading @ heading))
-    return replace(state, speed=min(max(own, SLOWEST_LEG), FASTEST))
+    return replace(state, speed=min(max(own, SLOWEST), FASTEST))
 
 
 # ----------------------------------------
@@ -313,16 +312,6 @@ __all__ = ["Flow", "Surfacings", "expect", "learn"]
 Flow = Callable[[float, float], tuple[Array, Array]]
 """Mean flow (m/s, (2,): east, north) between two times (s), and its covariance (m2/s2, (2, 2))."""
 
-COMMUNICATION = 900.0
-"""Seconds at the surface before they are known."""
-GPS = 10.0
-"""Metres, a component: error of the way between two fixes."""
-ALIKE = 0.5
-"""Correlation of the errors of a forecast of the flow and of the last current taken for one."""
-FLOORS = (0.03, 0.01, 0.01, 0.01)
-"""Added to the scores of the ways of steering, so that none is taken for perfect; where all were alike, as on
-a straight way, a glider is rather expected to follow its waypoint than to go on as before."""
-
 
 def expect(
     state: Surfacings, speed: float, speed_sigma: float, flow: Flow, surfacing_hours: float | None = None
@@ -337,7 +326,7 @@ def expect(
         return None
     interval, why = _interval(state, surfacing_hours)
     t_sigma = interval * timing.spread(state.errors)
-    at_surface = min(median(state.surface) if state.surface else COMMUNICATION, interval / 2)
+    at_surface = min(median(state.surface) if state.surface else COMMUNICATION, MOST_AT_SURFACE * interval)
     dive = interval - at_surface
     water, water_cov, share = _water(state, *flow(fix.t, fix.t + interval))
     # the last current is what the glider's own speed left of its way: the two belong together
@@ -349,7 +338,7 @@ def expect(
         interval**2 * water_cov
         + dive**2 * (speed_sigma**2 * np.outer(heading, heading) + own**2 * heading_cov)
         + t_sigma**2 * np.outer(over_ground, over_ground)
-        + GPS**2 * np.eye(2)
+        + GPS_ERROR**2 * np.eye(2)
     )
     lat, lon = from_plane(displacement, fix.lat, fix.lon)
     return NextSurfacing(
@@ -369,7 +358,7 @@ def _interval(state: Surfacings, hours: float | None) -> tuple[float, str]:
     """The next interval (s), and what it rests on."""
     if hours is None and not state.intervals:
         return state.duration + COMMUNICATION, "as long as the first dive"
-    missing = timing.KEPT - len(state.intervals) if hours is not None else 0
+    missing = INTERVALS_KEPT - len(state.intervals) if hours is not None else 0
     configured = (hours * 3600,) * missing if hours is not None else ()
     why = "as configured" if not state.intervals else "as configured and before" if missing else "as before"
     return timing.usual((*configured, *state.intervals)), why

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from gliderwatch.incidents.constants import WORSE_FLOW_ERROR, WORSE_SPEED
 from gliderwatch.incidents.state_machine import departure, is_severe
 from gliderwatch.model import Incident, Kind, Severity
 from gliderwatch.params import Attention
@@ -12,7 +13,7 @@ from gliderwatch.params import Attention
 # ----------------------------------------
 # When somebody has taken an incident on: it is brought to mind no more, until it grows worse.
 
-MARGINS = {Kind.ANOMALY: 0.05, Kind.FALSE_ALARM: 0.1}
+MARGINS = {Kind.ANOMALY: WORSE_SPEED, Kind.FALSE_ALARM: WORSE_FLOW_ERROR}
 """How much further out of the ordinary than when it was acknowledged counts as worse: m/s out of the normal
 range, or flow error p_E."""
 

@@ -9,12 +9,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from gliderwatch.incidents.overdue import FRESH, GONE
+from gliderwatch.incidents.constants import FRESH, GONE
 from gliderwatch.messages import incident_text
 from gliderwatch.messages.formatting import duration, place, utc
 from gliderwatch.model import Alert, Fix, Severity
 from gliderwatch.navigation.clock import DAY, HOUR, ROLLOVER, ClockStep, numbered, span
-from gliderwatch.navigation.fixes import FASTEST, distance
+from gliderwatch.navigation.constants import FASTEST_OVER_GROUND
+from gliderwatch.navigation.fixes import distance
 
 LEAST_STEP = 3 * HOUR
 """Seconds: a clock that was set by less is named in the notes of the dives alone."""
@@ -172,4 +173,4 @@ def _two_gliders(glider: str, places: Sequence[Fix]) -> Irregularity | None:
 
 def _is_too_far(a: Fix, b: Fix) -> bool:
     way = distance(a, b)
-    return way > FAR and way > FASTEST * abs(b.t - a.t)
+    return way > FAR and way > FASTEST_OVER_GROUND * abs(b.t - a.t)

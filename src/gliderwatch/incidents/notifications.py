@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Protocol
 
 from gliderwatch.incidents.acknowledgement import Acks
+from gliderwatch.incidents.constants import FLOW_CHANGE, NEWS, SPEED_CHANGE
 from gliderwatch.incidents.overdue import Silence
 from gliderwatch.incidents.unjudged import Unknown
 from gliderwatch.messages import incident_text
@@ -21,12 +22,6 @@ from gliderwatch.model import Alert, Assessment, Incident, NextSurfacing
 # a by-product of a change: they are the difference between the two, found anew after every input. Nothing
 # is said twice, and nothing that changed stays unsaid.
 
-NEWS = 86400.0
-"""Seconds: an incident that was over for longer when it became known is history, not news."""
-SPEED_CHANGE = 0.05
-"""m/s: a smaller change of a speed that was told is not worth a correction."""
-FLOW_CHANGE = 0.05
-"""m/s: the same for the reference flow."""
 NO_ACKS: Acks = MappingProxyType({})
 
 
@@ -48,8 +43,8 @@ class NotificationState:
     """What people have been told of one glider.
 
     ``surfaced`` is the surfacing of the last notice (s), ``silences`` what was told of its staying away
-    (`incidents.overdue`), ``unknown`` of dives that could not be judged (`incidents.unjudged`), ``irregularities``
-    the ids of those of its files.
+    (`incidents.overdue`), ``unknown`` of dives that could not be judged (`incidents.unjudged`),
+    ``irregularities`` the ids of those of its files.
     """
 
     threads: tuple[Thread, ...] = ()

@@ -11,10 +11,30 @@ from typing import Protocol
 
 import numpy as np
 
+from gliderwatch.forecast.constants import CHI2_COVERED
+from gliderwatch.incidents.constants import (
+    FILES_KEPT,
+    FLOW_SIGMA,
+    FRESH,
+    GONE,
+    GUESSED_SIGMA,
+    LATER_CALL,
+    LEAST_MARGIN,
+    LONGEST_CALL,
+    LOSSY,
+    MARGIN_GROWTH,
+    MESSAGE_LATE,
+    RECENT,
+    SAME_CALL,
+    SHORTEST_INTERVAL,
+    TIME_SIGMAS,
+    UNKNOWN_FLOW,
+)
 from gliderwatch.messages import overdue_text as message
 from gliderwatch.messages.overdue_text import Absence, DriftEllipse, Fleet
 from gliderwatch.model import Alert, Assessment, Incident, NextSurfacing, Severity
 from gliderwatch.navigation.geodesy import from_plane, to_plane
+from gliderwatch.sea.gauss_markov import FlowParams
 
 # ----------------------------------------
 # When a glider is overdue, and where it may be by then. Pure.
@@ -24,26 +44,7 @@ from gliderwatch.navigation.geodesy import from_plane, to_plane
 # growing intervals: one, two, four, ... margins after the expected surfacing.
 
 HOUR = 3600.0
-LEAST_MARGIN = 3 * HOUR
-"""Seconds by which a healthy glider may be late."""
-COMMUNICATION = 2400.0
-"""Seconds that a call takes at the most: its files come when it ends, not at the surfacing."""
-KEPT = 8
-"""Files from which the interval is guessed where dives do not tell it."""
-LOSSY = 3.0
-"""Intervals from file to file, above which it was a silence and not one or two files that were lost."""
-SIGMAS = 3.0
-"""Standard errors of the expected time that belong to the margin."""
-FRESH = 2 * 86400.0
-"""Seconds: a file that came longer after its end is history, no news of a glider at sea."""
-GONE = 30 * 86400.0
-"""Seconds of silence after which a deployment counts as over."""
-FLOW_SIGMA = 0.15
-"""m/s, a component: how far current and wind drift come to differ from the last known current. 0.11 is
-sqrt(2) times the 0.08 of the current itself; the rest is allowed for the wind at the surface."""
-FLOW_MEMORY = 30 * HOUR
-"""Seconds over which the current forgets."""
-_K95 = sqrt(5.991)
+_K95 = sqrt(CHI2_COVERED)
 """Semi-axes of the 95 % ellipse in standard deviations (chi-square, 2 degrees of freedom)."""
 
 
@@ -85,7 +86,7 @@ class ExpectedCall:
 
     def stage(self, k: int) -> float:
         """When it becomes overdue for the k-th time (s)."""
-        return float(self.t + (self.due - self.t) * 2.0**k)
+        return float(self.t + (self.due - self.t) * MARGIN_GROWTH**k)
 
     def stages(self, now: float) -> int:
         """How often it has become overdue."""
@@ -102,14 +103,14 @@ def margin(expected: NextSurfacing, signs: Iterable[Sign], now: float, overdue_h
         return overdue_hours * HOUR
     interval = expected.t - expected.after
     usual = rhythm(signs, now, LOSSY * interval) or interval
-    return max(LEAST_MARGIN, SIGMAS * expected.t_sigma, interval, usual) + COMMUNICATION
+    return max(LEAST_MARGIN, TIME_SIGMAS * expected.t_sigma, interval, usual) + LONGEST_CALL
 
 
 def rhythm(signs: Iterable[Sign], now: float, longest: float = inf) -> float | None:
     """Seconds from one file that comes to the next, usually: with the stay at the surface, and with the file
     between them where every other one is lost. After ``longest`` it is a silence. None: too few known."""
-    opened = sorted(s.opened_at for s in signs if s.opened_at <= now)[-KEPT:]
-    gaps = [b - a for a, b in pairwise(opened) if COMMUNICATION / 2 < b - a < longest]
+    opened = sorted(s.opened_at for s in signs if s.opened_at <= now)[-FILES_KEPT:]
+    gaps = [b - a for a, b in pairwise(opened) if SHORTEST_INTERVAL < b - a < longest]
     return median_low(gaps) if len(gaps) > 1 else None
 
 
@@ -122,7 +123,9 @@ def guess(signs: Iterable[Sign], now: float) -> NextSurfacing | None:
         return None
     last = max(s.opened_at for s in known)
     after = max((t for t in (s.time(interval) for s in known) if t <= now), default=last)
-    return NextSurfacing(after, after + interval, interval / 2, None, None, 0.0, 0.0, 0.0, "its last files")
+    return NextSurfacing(
+        after, after + interval, GUESSED_SIGMA * interval, None, None, 0.0, 0.0, 0.0, "its last files"
+    )
 
 
 def expected_call(
@@ -136,7 +139,7 @@ def expected_call(
     signs, interval = tuple(signs), expected.t - expected.after
     watched = min((s.at for s in signs), default=now)
     heard = max([expected.after, *(t for t in (s.life(interval, watched) for s in signs) if t <= now)])
-    t = heard + interval if heard > expected.after + interval / 2 else expected.t
+    t = heard + interval if heard > expected.after + LATER_CALL * interval else expected.t
     recent = (s for s in signs if now - s.opened_at <= GONE + FRESH)
     return ExpectedCall(heard, t, t + margin(expected, recent, now, overdue_hours), interval)
 
@@ -165,7 +168,7 @@ def first_call(
 
     What belongs to the call last heard may come up to a quarter of an interval later.
     """
-    late, signs = after.heard + after.interval / 4, tuple(signs)
+    late, signs = after.heard + SAME_CALL * after.interval, tuple(signs)
     watched = min((s.at for s in signs), default=now)
     times = [s.life(after.interval, watched) for s in signs] + ([] if surfacing is None else [surfacing])
     return min((t for t in times if (t > late or t == surfacing) and t <= now), default=None)
@@ -193,7 +196,7 @@ def drift(
 
     It drifts with the last known `flow` (east, north; m/s) from where it was expected, since then. The
     ellipse also reaches to where it would be, had it drifted since its last fix, at `place` (degrees). It
-    grows as the integral of an Ornstein-Uhlenbeck process of `FLOW_SIGMA` and `FLOW_MEMORY`.
+    grows as the integral of an Ornstein-Uhlenbeck process of `FLOW_SIGMA` and the memory of a current.
     """
     u = np.array(flow if flow is not None else (0.0, 0.0))
     if expected.lat is not None and expected.lon is not None:
@@ -207,9 +210,10 @@ def drift(
     else:
         return None
     elapsed = max(now - since, 0.0)
-    r = elapsed / FLOW_MEMORY
-    spread = FLOW_SIGMA if flow is not None else 2 * FLOW_SIGMA
-    cov = cov + 2 * (spread * FLOW_MEMORY) ** 2 * (r - 1 + exp(-r)) * np.eye(2)
+    memory = FlowParams().memory
+    r = elapsed / memory
+    spread = FLOW_SIGMA if flow is not None else UNKNOWN_FLOW * FLOW_SIGMA
+    cov = cov + 2 * (spread * memory) ** 2 * (r - 1 + exp(-r)) * np.eye(2)
     values, vectors = np.linalg.eigh(cov)
     east, north = vectors[:, 1]
     lat, lon = from_plane(u * elapsed, *origin)
@@ -223,12 +227,6 @@ def drift(
 # `hear` after an input: who was told that a glider is overdue is told that it called. `tick` as time goes by:
 # a glider that stays away is told, and brought to mind at growing intervals. Both look at what is known, not
 # at what changed, so that nothing is said twice and the order of arrival does not matter.
-
-LATE = 900.0
-"""Seconds: a message made later than that after its time tells of now (the service was off), an earlier one
-of its time, so that live and replay say the same."""
-RECENT = GONE + 2 * 86400.0
-"""Seconds: files opened before are no sign of life of the last 30 days."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -336,7 +334,7 @@ def tick(
     if fleet.is_silent and fleet.shore and not silence.messages:
         return (*kept, replace(silence, told=stages, shore=fleet.shore)), alerts
     since = silence.awaited.stage(stages - 1)
-    absence = _absence(silence.awaited, known, fleet, since if now - since < LATE else now)
+    absence = _absence(silence.awaited, known, fleet, since if now - since < MESSAGE_LATE else now)
     alert = message.overdue(
         absence,
         alert_id=f"{silence.id}/{silence.messages}",
@@ -404,7 +402,7 @@ def _absence(call: ExpectedCall, known: SilenceFacts, fleet: Fleet, now: float) 
         expected = NextSurfacing(call.heard, call.t, 0.0, None, None, 0.0, 0.0, 0.0, "")
     place = _both(last.lat, last.lon) if last is not None else None
     flow = _both(*message.current(last)) if last is not None else None
-    foreseen = expected if call.heard <= expected.after + call.interval / 2 else None
+    foreseen = expected if call.heard <= expected.after + LATER_CALL * call.interval else None
     return Absence(
         glider=known.glider,
         now=now,

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from gliderwatch.incidents.constants import SEVERE
 from gliderwatch.model import Assessment, Flag, Incident, Kind
 from gliderwatch.params import AnomalyRule, FalseAlarmRule, RuleParams
 
@@ -96,7 +97,7 @@ def _says_of_anomaly(dive: Assessment) -> bool | None:
 
 def is_severe(dive: Assessment) -> bool:
     """Whether the speed is below half of the lower bound of the normal range."""
-    return dive.speed is not None and dive.speed < dive.speed_min / 2
+    return dive.speed is not None and dive.speed < SEVERE * dive.speed_min
 
 
 def departure(dive: Assessment, kind: Kind) -> float:

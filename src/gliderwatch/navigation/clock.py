@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 from math import ceil
 
 from gliderwatch.model import Fix, Segment, SegmentId, Series, readonly
-from gliderwatch.navigation.fixes import FASTEST, distance
+from gliderwatch.navigation.constants import FASTEST_OVER_GROUND
+from gliderwatch.navigation.fixes import distance
 
 HOUR, DAY = 3600.0, 86400.0
 ROLLOVER = 1024 * 7 * DAY
@@ -188,5 +189,5 @@ def forward_step(
     step = identity.opened_at - last_t - PAUSE
     at_surface = last_t - fix.t < LONGEST_PAUSE and first.t - identity.opened_at < LONGEST_PAUSE
     between = first.t - fix.t - step
-    near = distance(fix, first) < FASTEST * between
+    near = distance(fix, first) < FASTEST_OVER_GROUND * between
     return step if step > LEAST_STEP and at_surface and near else 0.0

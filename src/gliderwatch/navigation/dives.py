@@ -9,26 +9,33 @@ import numpy as np
 
 from gliderwatch.model import Dive, DiveFeatures, Fix, Segment, Series, Unusable, readonly
 from gliderwatch.navigation.clock import forward_step, span
+from gliderwatch.navigation.constants import (
+    FASTEST_OVER_GROUND,
+    HEADING_GAP,
+    HIDING_HOLE,
+    JUMP,
+    LONGEST_DIVE,
+    MOST_BLIND,
+    MOST_DRIFT,
+    MOST_UNOBSERVED,
+    SHORTEST_DIP,
+    SHORTEST_DIVE,
+    SHORTEST_HOLE,
+    SPARSE,
+    STEADY_COURSE,
+    SUSPECT_DISTANCE,
+    TURNED_MUCH,
+)
 from gliderwatch.navigation.dac import Known, Report, new_reports, pair, updated
 from gliderwatch.navigation.features import flight_features, track_features
-from gliderwatch.navigation.fixes import FASTEST, SUSPECT, distance, new_fixes, surface_intervals
-from gliderwatch.navigation.flight import SPARSE, Flight, find_flight, lengthened, unseen
+from gliderwatch.navigation.fixes import distance, new_fixes, surface_intervals
+from gliderwatch.navigation.flight import Flight, find_flight, lengthened, unseen
 from gliderwatch.navigation.pressure import zeroed
 from gliderwatch.navigation.samples import Samples, after, concatenated, get, prepare
-from gliderwatch.navigation.track import CIRCLING, build_track
+from gliderwatch.navigation.track import build_track
 
 # ----------------------------------------
 # Whether a dive can be used, and what a reader should know of its data.
-
-UNOBSERVED = 0.25
-"""Share of the interval between two fixes that may be missing before a dive cannot be used."""
-BLIND = 0.8
-"""Share of a flight without any heading beyond which a dive cannot be used. Some files hold every
-third yo only: a glider on its way to a waypoint steers much the same in between."""
-STEADY = 0.9
-"""Length of the mean of the headings seen above which the glider is taken to have kept it in between."""
-SURFACE = 0.5
-"""Share of the interval between two fixes that the glider may have drifted before it cannot be used."""
 
 
 def why_unusable(
@@ -43,13 +50,13 @@ def why_unusable(
     if start is None:
         return Unusable.NO_FIX_BEFORE, "no fix before the dive"
     interval = end.t - start.t
-    if flight.evidence == "missing" or missing > UNOBSERVED * interval:
+    if flight.evidence == "missing" or missing > MOST_UNOBSERVED * interval:
         words = f"data missing: {missing / 3600:.1f} of {interval / 3600:.1f} h between two fixes"
         return Unusable.DATA_MISSING, words
-    if interval - flight.duration > SURFACE * interval:
+    if interval - flight.duration > MOST_DRIFT * interval:
         return Unusable.SURFACE_DRIFT, "mostly surface drift"
     over_ground = distance(start, end) / interval
-    if over_ground > FASTEST:
+    if over_ground > FASTEST_OVER_GROUND:
         return Unusable.WILD_FIX, f"wild fix: {over_ground:.0f} m/s over ground"
     return _blind(samples, flight)
 
@@ -57,9 +64,9 @@ def why_unusable(
 def _blind(samples: Samples, flight: Flight) -> tuple[Unusable | None, str]:
     """Why the headings of a flight do not do, and the same in words; None and empty when they do."""
     gap = heading_gap(samples, flight)
-    if gap > BLIND * flight.duration:
+    if gap > MOST_BLIND * flight.duration:
         return Unusable.NO_HEADING, f"no heading for {gap / 3600:.1f} h"
-    if gap > 2 * SPARSE and _heading_length(samples, flight) < STEADY:
+    if gap > HEADING_GAP and _heading_length(samples, flight) < STEADY_COURSE:
         return Unusable.TURNING, f"turning, and no heading for {gap / 3600:.1f} h"
     return None, ""
 
@@ -105,7 +112,7 @@ def flight_notes(flight: Flight, features: DiveFeatures) -> tuple[str, ...]:
     notes = []
     if flight.evidence == "heading":
         notes.append("no depth or pitch in the file: drift at the surface cannot be told from flight")
-    if features.heading_steadiness is not None and features.heading_steadiness < max(CIRCLING, 0.5):
+    if features.heading_steadiness is not None and features.heading_steadiness < TURNED_MUCH:
         notes.append("the glider turned much: its speed is hardly observable")
     if features.heading_gap is not None:
         notes.append(f"no heading for {features.heading_gap / 3600:.1f} h of the dive: taken as steady")
@@ -120,16 +127,6 @@ def flight_notes(flight: Flight, features: DiveFeatures) -> tuple[str, ...]:
 # A dive lies between two fixes. The fix that ends it, and the current that the glider computed for it,
 # often come only with the next segment: so the state carries on the samples since the last fix,
 # and a dive is told again when more of it is known.
-
-SHORTEST = 900.0
-"""Seconds: a shorter stay under water says too little of speed, a shorter hole in the data is none."""
-DIP = 120.0
-"""Seconds: a stay under water this long is a dive of which the glider computes a current."""
-LONGEST = 3 * 86400.0
-"""Seconds between fixes: a longer one is not a dive but a gap between deployments."""
-HIDING = 3600.0
-"""Seconds: a hole in the data this long may hide a whole dive; in shorter ones a glider waits at the
-surface between two missions, and corrects the current of the dive before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,16 +179,16 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
     fixes = new_fixes(samples, state.fix)
     state, told = _withdraw_old_fix(state, fixes)
     untold = [state.untold] if state.untold is not None else []
-    for first, last in surface_intervals(fixes, DIP):
+    for first, last in surface_intervals(fixes, SHORTEST_DIP):
         flight = _flight_since(state, samples, first)
-        if flight is not None and flight.duration >= SHORTEST:
+        if flight is not None and flight.duration >= SHORTEST_DIVE:
             told.append(_dive(state, segment.id.glider, samples, flight, first))
-        elif flight is not None and flight.duration >= DIP:
+        elif flight is not None and flight.duration >= SHORTEST_DIP:
             untold.append(flight.end)
         holes = tuple((max(a, last.t), b) for a, b in state.holes if b > last.t)
         state = replace(state, fix=last, holder=segment.id.name, holes=holes, notes=quality)
 
-    oldest = (state.last_t or 0.0) - LONGEST
+    oldest = (state.last_t or 0.0) - LONGEST_DIVE
     carry = after(samples, max(state.fix.t, oldest) if state.fix is not None else oldest)
     under_way = _flight_since(state, carry, None)
     told, waiting = _with_currents(told, untold, under_way, [*state.reports, *reports])
@@ -200,7 +197,7 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
     later = later if later is not None and (latest is None or later > latest.t_surface) else None
     state = replace(state, carry=carry, reports=tuple(waiting), dive=latest, untold=later)
     news = [d for d in told if d is not before]
-    if under_way is not None and under_way.duration >= SHORTEST:
+    if under_way is not None and under_way.duration >= SHORTEST_DIVE:
         news.append(_dive(state, segment.id.glider, carry, under_way, None))
     return state, news
 
@@ -215,7 +212,7 @@ def _with_declination(state: Navigation, segment: Segment) -> Navigation:
     t = segment.id.opened_at
     if segment.declination_source == "glider":
         return replace(state, declination=segment.declination, declination_t=t)
-    if state.declination_t is not None and t - state.declination_t < LONGEST:
+    if state.declination_t is not None and t - state.declination_t < LONGEST_DIVE:
         return state
     return replace(state, declination=segment.declination, declination_t=None)
 
@@ -223,7 +220,7 @@ def _with_declination(state: Navigation, segment: Segment) -> Navigation:
 def _placed(state: Navigation, segment: Segment, fresh: Samples, quality: tuple[str, ...]) -> Navigation:
     """The state with the place of a segment in time: a hole before it, and whether it holds the flight."""
     holes = state.holes
-    if state.last_t is not None and segment.id.opened_at - state.last_t > SHORTEST:
+    if state.last_t is not None and segment.id.opened_at - state.last_t > SHORTEST_HOLE:
         holes = (*holes, (state.last_t, segment.id.opened_at))
     flies = find_flight(fresh, segment.id.opened_at - SPARSE, segment.last_t) is not None
     return replace(
@@ -259,7 +256,7 @@ def _withdraw_old_fix(state: Navigation, fixes: list[Fix]) -> tuple[Navigation, 
         return state, []
     if fixes and state.fix is not None and state.dive.end == state.fix:
         gap = fixes[0].t - state.fix.t
-        if gap < SHORTEST and distance(state.fix, fixes[0]) > FASTEST * gap + 100.0:
+        if gap < SHORTEST_DIVE and distance(state.fix, fixes[0]) > FASTEST_OVER_GROUND * gap + JUMP:
             withdrawn = replace(
                 state.dive,
                 end=fixes[0],
@@ -278,13 +275,17 @@ def _flight_since(state: Navigation, samples: Samples, end: Fix | None) -> Fligh
         state.fix.t if state.fix is not None else min((float(s.t[0]) for s in samples.values()), default=0.0)
     )
     last = end.t if end is not None else max((float(s.t[-1]) for s in samples.values()), default=0.0)
-    if not DIP < last - first <= LONGEST:
+    if not SHORTEST_DIP < last - first <= LONGEST_DIVE:
         return None
     flight = find_flight(samples, first, last)
-    if flight is None and state.fix is not None and (end is None or distance(state.fix, end) > SUSPECT):
-        hidden = [(a, min(b, last)) for a, b in state.holes if min(b, last) - a >= HIDING]
+    if (
+        flight is None
+        and state.fix is not None
+        and (end is None or distance(state.fix, end) > SUSPECT_DISTANCE)
+    ):
+        hidden = [(a, min(b, last)) for a, b in state.holes if min(b, last) - a >= HIDING_HOLE]
         flight = Flight(*hidden[-1], evidence="missing") if hidden else None
-        if flight is None and end is not None and last - first >= HIDING:
+        if flight is None and end is not None and last - first >= HIDING_HOLE:
             flight = unseen(samples, first, last)
     return flight
 
@@ -304,7 +305,7 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
         gap = heading_gap(samples, flight)
         features = replace(
             track_features(samples, flight, track),
-            heading_gap=gap if gap > 2 * SPARSE else None,
+            heading_gap=gap if gap > HEADING_GAP else None,
             unobserved=missing,
         )
     return Dive(

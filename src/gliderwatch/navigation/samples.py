@@ -10,17 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gliderwatch.model import EMPTY, Array, Segment, Series, readonly
+from gliderwatch.navigation.constants import FULL_POWER, SPACING
 from gliderwatch.navigation.geodesy import heading_vectors, magnetic_to_true
 
 Samples = Mapping[str, Series]
 
-SPACING = 30.0
-"""Seconds: finer samples are averaged to this. A glider turns and pitches in minutes, and a
-checkpoint that carries a dive on to the next segment stays small also for 4 s data."""
 
-FULL_POWER = 24.0
-"""W of a thruster that is fully on: power goes with the square of the setting (electa-2022: 2.9 W at 35 %,
-8.6 W at 60 %)."""
 _VOLUMES = ("ballast", "oil_volume")
 _KEPT = ("pitch", "roll", "depth", "speed_onboard", "dr_state", "dr_time", "thruster_on", "vacuum", *_VOLUMES)
 _PAIRS = (("fix_lat", "fix_lon"), ("dr_lat", "dr_lon"))

@@ -1,4 +1,4 @@
-"""What to run: every fault in every size and sea, healthy gliders in every sea, and the estimators by name."""
+"""What to run: every fault in every size and sea, healthy gliders in every sea; estimators by name."""
 
 from __future__ import annotations
 

@@ -19,7 +19,8 @@ from gliderwatch import __version__
 from gliderwatch.config import Config
 from gliderwatch.config.schema import Metrics as Settings
 from gliderwatch.delivery.dispatcher import Delivery
-from gliderwatch.incidents.overdue import GONE, RECENT, expected_call
+from gliderwatch.incidents.constants import GONE, RECENT
+from gliderwatch.incidents.overdue import expected_call
 from gliderwatch.model import Assessment
 from gliderwatch.service.liveness import STALE
 from gliderwatch.store.state_file import File, Status, Store

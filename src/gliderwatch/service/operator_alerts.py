@@ -13,7 +13,8 @@ from pathlib import Path
 from gliderwatch.config import Config
 from gliderwatch.config.schema import Operator as Settings
 from gliderwatch.incidents.acknowledgement import with_mute
-from gliderwatch.incidents.overdue import GONE, outlook
+from gliderwatch.incidents.constants import GONE
+from gliderwatch.incidents.overdue import outlook
 from gliderwatch.messages import incident_text
 from gliderwatch.messages.formatting import duration, utc
 from gliderwatch.model import Alert, Severity

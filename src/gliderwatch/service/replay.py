@@ -15,7 +15,7 @@ from gliderwatch.config import Config, expand
 from gliderwatch.delivery.channels import Channel
 from gliderwatch.delivery.dispatcher import Dispatcher
 from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine, Retry
-from gliderwatch.incidents.overdue import GONE
+from gliderwatch.incidents.constants import GONE
 from gliderwatch.model import Alert, Hindrance, Segment
 from gliderwatch.navigation.clock import Stamp, corrections, is_same, numbered
 from gliderwatch.params import GliderParams

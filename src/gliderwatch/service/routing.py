@@ -15,8 +15,8 @@ from gliderwatch.store.state_file import Store
 
 @dataclass(frozen=True, slots=True)
 class Routing:
-    """Who is told: ``channels`` of an alert (a mapping says what they wait for, see `service.routing`), of which
-    gliders surfacing notices are wanted, and how the silence of a glider is taken."""
+    """Who is told: ``channels`` of an alert (a mapping says what they wait for), of which gliders
+    surfacing notices are wanted, and how the silence of a glider is taken."""
 
     channels: Callable[[Alert], Iterable[str]]
     notices: Callable[[str], bool]

@@ -1,4 +1,4 @@
-"""How states and segments are written down (JSON, versioned, compressed, never pickle), and rows as values."""
+"""How states and segments are written down (JSON, versioned, compressed, no pickle), and rows as values."""
 
 from __future__ import annotations
 

@@ -5,8 +5,8 @@ given up (the channel refused it for good, or it cannot be read any more) or wit
 acknowledged its incident before it was due. ``error`` says why in words, for people.
 
 A row is held until ``held_until``, or until ``escalates`` while nobody has acknowledged its incident,
-whichever is first (`incidents.send_schedule`); infinite is never. Within an incident and channel no row is held longer
-than a later one: what is urgent brings along what came before it.
+whichever is first (`incidents.send_schedule`); infinite is never. Within an incident and channel no row is
+held longer than a later one: what is urgent brings along what came before it.
 """
 
 from __future__ import annotations

@@ -9,9 +9,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from gliderwatch.incidents.acknowledgement import Ack, Acks
+from gliderwatch.incidents.constants import GONE
 from gliderwatch.incidents.irregularities import PLACES, Coming, Irregularity, found
 from gliderwatch.incidents.notifications import NotificationState
-from gliderwatch.incidents.overdue import GONE, Sign
+from gliderwatch.incidents.overdue import Sign
 from gliderwatch.messages.unjudged_text import Unjudged
 from gliderwatch.model import Alert, Assessment, Fix, Hindrance, Incident, NextSurfacing, SegmentId, Unusable
 from gliderwatch.navigation.clock import SAME_OPENING, ClockStep
