@@ -14,7 +14,7 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from gliderwatch.estimation.causes import FASTEST
+from gliderwatch.estimation.measurement import FASTEST
 from gliderwatch.estimation.reckoned import MAD_TO_SIGMA
 from gliderwatch.model import Array, readonly
 
