@@ -12,7 +12,7 @@ import pytest
 
 from gliderwatch.estimation import baseline
 from gliderwatch.estimation.adaptive import AdaptiveParams
-from gliderwatch.estimation.causes import Surprise, Surprises
+from gliderwatch.estimation.causes import Mode
 from gliderwatch.estimation.flow import FlowParams, Tide
 from gliderwatch.estimation.joint import JointParams
 from gliderwatch.estimation.range import RangeParams
@@ -37,7 +37,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "nomenclature.md"
 SOURCE = ROOT / "src" / "gliderwatch"
 SETTINGS = (GliderParams, LearnerParams, RuleParams, AnomalyRule, FalseAlarmRule, Attention, AdaptiveParams)
-JOINT = (SpeedParams, JointParams, FlowParams, Tide, Surprises, Surprise, RangeParams)
+JOINT = (SpeedParams, JointParams, FlowParams, Tide, Mode, RangeParams)
 ENDS = ("_low", "_usual", "_high")
 
 

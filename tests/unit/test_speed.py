@@ -76,12 +76,12 @@ def test_wrong_current_is_named():
 
 
 def test_lost_wing_is_told_where_it_rolls_the_glider():
-    made = ways(30, 5, lambda k: 0.3)
-    lost = [w if k < 15 else replace(slower(w, 0.5, hidden=True), roll=0.4) for k, w in enumerate(made)]
+    made = ways(52, 5, lambda k: 0.3)  # on the fifth day, when the tides of this sea are known
+    lost = [w if k < 36 else replace(slower(w, 0.5, hidden=True), roll=0.4) for k, w in enumerate(made)]
     _, verdicts = run(mission(lost))
-    assert Flag.ANOMALY in flags(verdicts[15:18])
+    assert Flag.ANOMALY in flags(verdicts[36:39])
     assert "wing" in verdicts[-1].reason
-    assert Flag.ANOMALY not in flags(verdicts[:15])
+    assert Flag.ANOMALY not in flags(verdicts[:36])
 
 
 def test_roll_alone_is_no_anomaly():

@@ -8,20 +8,23 @@ modes their weights, and the state after the dive is the mixture (GPB of order o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from math import log, pi, sqrt
 
 import numpy as np
 
-from gliderwatch.estimation.measurement import FASTEST, OWN, SLIP, Measured, expected
+from gliderwatch.estimation.measurement import FASTEST, OWN, SIDE, SLIP, Measured, expected
 from gliderwatch.model import Array
 
 ITERATIONS = 3
+BEYOND = 0.02
+"""m/s by which a speed may be found beyond what a glider can fly, before that speaks against an explanation."""
+STAYS = 0.6
+"""Chance that a current, or a ground velocity, which is wrong on one dive is wrong on the next one too: a fault lasts."""
 LEFT_OUT = 10.0
 """m/s: error given to a measurement that is wrong: it is left out, be it as near as it may."""
-TAIL = 6.0
-"""Degrees of freedom of Student's t by which innovations are judged: no dive alone is beyond all doubt."""
 
 
 class Cause(StrEnum):
@@ -32,6 +35,7 @@ class Cause(StrEnum):
     FLOW = "another flow"
     CURRENT = "wrong current"
     GROUND = "wrong ground velocity"
+    WING = "a wing lost or bent"
 
     @property
     def is_error(self) -> bool:
@@ -64,6 +68,20 @@ MODES = (
 )
 
 
+def switched(modes: tuple[Mode, ...], before: Mapping[Cause, float]) -> tuple[Mode, ...]:
+    """The modes with the chances that they have after a dive which was explained so ``before``: what is wrong stays."""
+    rare = {mode.cause: max(mode.chance, STAYS * before.get(mode.cause, 0.0)) for mode in modes if mode.cause.is_error}
+    left = 1 - sum(rare.values())
+    rest = sum(mode.chance for mode in modes if not mode.cause.is_error)
+    return tuple(
+        replace(mode, chance=rare.get(mode.cause, mode.chance / rest * left if rest else left)) for mode in modes
+    )
+
+
+ROLLED = Mode(Cause.WING, 0.4, 0.3)
+"""Beside these where the glider has just begun to roll otherwise: ``size`` is of slip, a third of that of side."""
+
+
 @dataclass(frozen=True, slots=True)
 class Explained:
     """A dive as one of the modes has it.
@@ -89,7 +107,7 @@ class Explained:
 
 
 def explain(
-    x: Array, cov: Array, jumped: Array, measured: Measured, modes: tuple[Mode, ...] = MODES
+    x: Array, cov: Array, jumped: Array, measured: Measured, modes: tuple[Mode, ...]
 ) -> list[Explained]:
     """The dive in each of the modes, with weights that add up to 1.
 
@@ -111,8 +129,11 @@ def explain(
         inverse = np.linalg.inv(s)
         innovation = values - found - (slope @ (x - state)[:, :, None])[:, :, 0]
         state = x + (turned @ (inverse @ innovation[:, :, None]))[:, :, 0]
-        state[:, OWN] = np.clip(state[:, OWN], 0.0, FASTEST)
+        free = state[:, OWN].copy()
+        state[:, OWN] = np.clip(free, 0.0, FASTEST)
         state[:, SLIP:] = np.clip(state[:, SLIP:], [-0.1, -0.85], [0.95, 0.85])
+    beyond = np.maximum(np.maximum(-free, free - FASTEST), 0.0)
+    logs = logs - 0.5 * (beyond / BEYOND) ** 2
     squares = np.einsum("ki,kij,kj->k", innovation, inverse, innovation)
     logs = logs - 0.5 * (np.linalg.slogdet(s)[1] + squares)
     weights = np.exp(logs - logs.max())
@@ -140,6 +161,8 @@ def _opened(
             opened[k, OWN, OWN] += mode.size**2
         elif mode.cause is Cause.FLOW:
             opened[k] += mode.size**2 * jumped
+        elif mode.cause is Cause.WING:
+            opened[k][[SLIP, SIDE], [SLIP, SIDE]] += np.square([mode.size, mode.size / 3])
         elif mode.cause.is_error:
             at = slice(2, 4) if mode.cause is Cause.CURRENT else slice(0, 2)
             wrong[k, at, at] = mode.size**2 * np.eye(2)

@@ -16,7 +16,7 @@ import numpy as np
 
 from gliderwatch.detection.sequential import Bank, Step, Update
 from gliderwatch.estimation import flow, hidden
-from gliderwatch.estimation.causes import LEFT_OUT, Cause, Explained, explain
+from gliderwatch.estimation.causes import MODES, ROLLED, Cause, Explained, Mode, explain, switched
 from gliderwatch.estimation.flow import FlowParams, Passage
 from gliderwatch.estimation.measurement import FASTEST, OWN, SHOWN, SIDE, SLIP, Measured, Slipping, slip_of
 from gliderwatch.estimation.noise import learn_doubt, learn_sea
@@ -24,8 +24,6 @@ from gliderwatch.estimation.observation import Observation, are_apart, observe
 from gliderwatch.estimation.reckoned import Reckoned
 from gliderwatch.model import Array, Dive, Fix, readonly
 
-LOST, TURNED = 0.3, 0.1
-"""Slip and side (parts of W) that a damaged wing may add: by this they are opened where it is hinted at."""
 LEAST_SLIP, MOST_SLIP, MOST_SIDE = -0.1, 0.95, 0.85
 """What slip of the state can be: on board at most a tenth of W too much is allowed for the angle of attack, and a
 glider does not fly backwards. A compass, or a bent wing, that turns the way by more than a radian (its sine) is not
@@ -38,7 +36,7 @@ RARE = 1e-3
 class JointParams:
     """What is known before any dive.
 
-    ``speed``, ``speed_sigma`` of W (m/s) and ``speed_wander`` its usual change in 3 h; ``slip`` the part of
+    ``modes`` are how a dive can be explained; ``speed``, ``speed_sigma`` of W (m/s) and ``speed_wander`` its usual change in 3 h; ``slip`` the part of
     the physical slip that is real (on board some is allowed for: a DAC is 5 to 10 % of W off), with
     ``slip_sigma`` its standard error as part of W, ``side_sigma`` that of side (rad), ``slip_memory`` (s) of both;
     ``own_noise`` the error of W on a dive as part of it; ``front`` (m/s) by how
@@ -46,6 +44,7 @@ class JointParams:
     """
 
     flow: FlowParams = FlowParams()
+    modes: tuple[Mode, ...] = MODES
     speed: float = 0.35
     speed_sigma: float = 0.2
     speed_wander: float = 0.015
@@ -65,7 +64,8 @@ class JointState:
     ``t`` end of the last dive (s), ``x`` ((n,)) and ``cov`` ((n, n)) of the state; ``sea`` factor on the
     variance of the flow's changes and ``doubt`` on that of the measurements, both learnt; ``dives`` used;
     ``bank`` of the test for a step; ``nis`` and ``dof``, sums of the normalised innovations squared and
-    of their degrees of freedom on usual dives; ``end`` the fix that ended the last dive.
+    of their degrees of freedom on usual dives; ``end`` the fix that ended the last dive; ``wrong`` how likely each of
+    its measurements was wrong.
     """
 
     t: float
@@ -78,6 +78,7 @@ class JointState:
     nis: float = 0.0
     dof: int = 0
     end: Fix | None = None
+    wrong: dict[Cause, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,13 +154,14 @@ def step(
     if state is None or (state.end is not None and are_apart(state.end, dive.start)):
         state = init(params, seen.start)
     passage = _passage(state, seen, dive.start.lat, params)
-    state = _predicted(state, seen, passage, hint, params)
+    state = _predicted(state, seen, passage, params)
     slipping = Slipping(params.slip * seen.slip, math.sqrt(state.doubt) * params.own_noise, usual)
     measured = Measured(seen, tells, state.doubt, slipping)
     steps = _jump(params.flow)
-    ways = explain(state.x[-SHOWN:], state.cov[-SHOWN:, -SHOWN:], steps[-SHOWN:] @ steps[-SHOWN:].T, measured)
-    best = max(ways, key=lambda way: way.weight)
-    odds = {str(cause): sum(w.weight for w in ways if w.cause is cause) for cause in {w.cause for w in ways}}
+    shown, jumped = state.cov[-SHOWN:, -SHOWN:], steps[-SHOWN:] @ steps[-SHOWN:].T
+    modes = switched(params.modes, state.wrong)
+    ways = explain(state.x[-SHOWN:], shown, jumped, measured, (*modes, *((ROLLED,) if hint else ())))
+    odds = {str(cause): sum(w.weight for w in ways if w.cause is cause) for cause in dict.fromkeys(w.cause for w in ways)}
     cause = max(odds, key=lambda each: odds[each])
     best = max((w for w in ways if str(w.cause) == cause), key=lambda way: way.weight)
     believed = seen.own_speed()
@@ -178,6 +180,7 @@ def step(
         bank=bank,
         end=dive.end,
         dives=state.dives + 1,
+        wrong={each: odds[str(each)] for each in Cause if each.is_error and str(each) in odds},
         nis=state.nis + counts * best.square,
         dof=state.dof + counts * len(best.innovation),
     )
@@ -219,7 +222,7 @@ def _jump(params: FlowParams) -> Array:
 
 
 def _predicted(
-    state: JointState, seen: Observation, passage: Passage, hint: bool, params: JointParams
+    state: JointState, seen: Observation, passage: Passage, params: JointParams
 ) -> JointState:
     """The state at the end of a dive, before what it measures."""
     dt = max(seen.end - state.t, 0.0)
@@ -231,7 +234,7 @@ def _predicted(
     kept = np.square([params.slip_sigma, params.side_sigma]) * (1 - fades**2)
     noise[[OWN, SLIP, SIDE], [OWN, SLIP, SIDE]] = [
         params.speed_wander**2 * dt / (3 * flow.HOUR),
-        *(kept + np.square([LOST, TURNED]) * hint),
+        *kept,
     ]
     before = state.x[: params.flow.size]
     crossed = flow.crossing(before[0:2] + before[2:4], seen.ground, dt, params.flow)
@@ -255,6 +258,10 @@ def _cov(state: JointState, way: Explained, steps: Array) -> Array:
     if way.cause is Cause.SPEED:
         cov = state.cov.copy()
         cov[OWN, OWN] += way.size**2
+        return cov
+    if way.cause is Cause.WING:
+        cov = state.cov.copy()
+        cov[[SLIP, SIDE], [SLIP, SIDE]] += np.square([way.size, way.size / 3])
         return cov
     return state.cov
 

@@ -29,6 +29,8 @@ and how many times that does not add to the sum."""
 OWN_SURE = 0.15
 """Standard error of W on a dive, as part of it, up to which the dive tells what W is to what is reported."""
 NOT_FLOWN = "the way does not fit the commanded heading, and the measured one is not in the file"
+HIDDEN = 0.1
+"""Part of the speed that the glider believes, by which it must be slower to be slower than that."""
 ROLLED, ROLLS = 0.12, 5
 """rad: a step of the mean roll that speaks for a lost or bent wing; dives that tell the usual roll, and
 samples that tell the roll of a dive."""
@@ -198,19 +200,25 @@ def _small_losses(
     if not normal.dives:
         return state, Flag.NORMAL, ""
     bound = cusum_bound(SLACK, DIVES_A_MONTH / params.joint.alarms_per_month)
-    total = cusum(state.slow, (1 - info.estimate.speed / normal.usual) / DEPARTURE, SLACK)
-    state = replace(state, slow=min(total, 2 * bound))
+    found = info.estimate
+    # a dive that hardly tells the speed adds little, and no dive alone is several
+    departure = (1 - found.speed / normal.usual) / max(DEPARTURE, found.own_sigma / normal.usual)
+    total = min(cusum(state.slow, min(departure, bound / 2 + SLACK), SLACK), bound + SLACK)
+    if departure < SLACK / 2:
+        total /= 2  # it flies as usual: what was slow is over soon
+    state = replace(state, slow=total)
     if total > bound:
-        return state, Flag.ANOMALY, "a little slow for several dives"
+        return state, Flag.ANOMALY, _how_slow(info, normal, params, "a little slow for several dives")
     return state, Flag.NORMAL, ""
 
 
-def _how_slow(info: JointInfo, normal: SpeedRange, params: SpeedParams) -> str:
-    """Words for a speed below normal."""
+def _how_slow(info: JointInfo, normal: SpeedRange, params: SpeedParams, words: str = "slower than normal") -> str:
+    """Words for a speed below normal: that of the glider itself is, or it does not know of it."""
     believed = info.estimate.own_speed * (1 - params.joint.slip * info.seen.slip)
-    if believed >= normal.low:
+    hidden = believed - info.estimate.speed > HIDDEN * believed
+    if hidden and believed >= (normal.low + normal.usual) / 2:
         return "slower through the water than the glider itself believes: a wing may be lost or bent"
-    return "slower than normal"
+    return words
 
 
 def _rolls(state: SpeedState, dive: Dive) -> bool:
