@@ -171,7 +171,8 @@ def step(
     usually = [w for w in ways if w.cause is Cause.USUAL and w.believes == best.believes]
     tested = _update(state, usually[0] if usually and best.cause is Cause.FLOW else best, steps)
     loss, turn, bank = hidden.steps(state.bank, passage_matrix(passage), tested, steps, params.front)
-    told = hidden.told(loss, turn, params.alarms_per_month)
+    # where no heading was measured, what looks like a step is a turn that was not seen
+    told = None if seen.is_free else hidden.told(loss, turn, params.alarms_per_month)
     counts = best.cause is Cause.USUAL
     after = replace(
         after,

@@ -28,7 +28,7 @@ DEPARTURE, SLACK = 0.08, 1.0
 and how many times that does not add to the sum."""
 OWN_SURE = 0.15
 """Standard error of W on a dive, as part of it, up to which the dive tells what W is to what is reported."""
-NOT_FLOWN = "the way does not fit the commanded heading, and the measured one is not in the file"
+NOT_SEEN = "it turned, and its heading is not in the file: the speed cannot be told"
 HIDDEN = 0.1
 """Part of the speed that the glider believes, by which it must be slower to be slower than that."""
 ROLLED, ROLLS = 0.12, 5
@@ -111,10 +111,13 @@ def step(
         return state, Verdict(flag, reason, normal, None)
     state = replace(state, joint=estimate, rolled=rolled, misfits=_misfits(state, info))
     flag, reason = _wrong(state, info, params)
-    if flag is not None and info.cause is not Cause.CURRENT and dive.evidence.get("heading_commanded", 0.0):
-        flag, reason = None, NOT_FLOWN  # nothing is wrong that is measured
     if flag is None and not reason:
         state, flag, reason = _slow_or_fast(state, info, told, normal, params)
+    # a course that was not steady looks slow: where no heading is known at all depth rate and pitch decide
+    assumed = flag is Flag.ANOMALY and dive.evidence.get("heading_assumed", 0.0) > 0 and told is not None
+    if (flag is None and info.seen.is_free) or assumed:
+        reason = NOT_SEEN if assumed else reason
+        flag, reason = _by_reckoning(reason, state, told, normal, params)
     if flag is Flag.NORMAL and not frozen:
         state = _learnt(state, dive, info, at, params)
     return state, Verdict(flag, reason, normal, info)
@@ -136,6 +139,8 @@ def _wrong(state: SpeedState, info: JointInfo, params: SpeedParams) -> tuple[Fla
         return Flag.FALSE_ALARM, str(blame(state.misfits, params.gate, params.least))
     if info.cause is Cause.CURRENT:
         return Flag.FALSE_ALARM, "the current does not fit those before, the ground velocity does"
+    if info.cause is Cause.GROUND and info.seen.is_free:
+        return None, NOT_SEEN
     if info.cause is Cause.GROUND:
         return (
             Flag.FALSE_ALARM,
@@ -151,12 +156,22 @@ def _of_reckoning_alone(
     state: SpeedState, dive: Dive, told: Reckoned | None, normal: SpeedRange, params: SpeedParams
 ) -> tuple[Flag | None, str]:
     """Flag 1 where a dive without track is slow by what the glider tells at once; else its reason."""
+    return _by_reckoning(dive.reason, state, told, normal, params)
+
+
+def _by_reckoning(
+    why: str, state: SpeedState, told: Reckoned | None, normal: SpeedRange, params: SpeedParams
+) -> tuple[Flag | None, str]:
+    """The flag that depth rate and pitch alone give, where the way says nothing because of ``why``."""
     if told is None or not told.is_prompt or state.joint is None or not normal.dives:
-        return None, dive.reason
+        return None, why
     # no course that was steered can look like this: the bound is wide because nothing else confirms it
-    if (told.speed + 2 * params.confidence * told.sigma) * (1 - _usual_slip(params)) < normal.low:
-        return Flag.ANOMALY, f"slower than normal by depth rate and pitch alone ({dive.reason})"
-    return None, dive.reason
+    left, sigma = 1 - _usual_slip(params), params.confidence * told.sigma
+    if (told.speed + 2 * sigma) * left < normal.low:
+        return Flag.ANOMALY, f"slower than normal by depth rate and pitch alone ({why})"
+    if (told.speed - sigma / 2) * left > normal.low:
+        return Flag.NORMAL, f"as fast as usual by depth rate and pitch alone ({why})"
+    return None, why
 
 
 def _slow_or_fast(
@@ -170,7 +185,9 @@ def _slow_or_fast(
     # what is common to all dives is also in a range that was learnt from them
     sigma = params.confidence * (info.estimate.own_sigma if normal.dives else info.estimate.sigma)
     if info.estimate.speed + sigma < normal.low:
-        if not state.doubted and believed is None and _may_have_turned(info, normal):
+        # depth rate and pitch would be slow as well; where they are not sent a second dive has to be slow
+        unseen = info.seen.is_free and (told is not None or not state.doubted)
+        if believed is None and (unseen or (not state.doubted and _may_have_turned(info, normal))):
             reason = "slow, or it turned while its heading was not seen: the next dive will tell"
             return replace(state, doubted=1), None, reason
         return state, Flag.ANOMALY, _how_slow(info, normal, params)
@@ -197,7 +214,7 @@ def _small_losses(
     state: SpeedState, info: JointInfo, normal: SpeedRange, params: SpeedParams
 ) -> tuple[SpeedState, Flag, str]:
     """Flag 1 where a loss too small for one dive has gone on for several; the state with the sum of it."""
-    if not normal.dives:
+    if not normal.dives or (info.seen.is_free and not info.believes):
         return state, Flag.NORMAL, ""
     bound = cusum_bound(SLACK, DIVES_A_MONTH / params.joint.alarms_per_month)
     found = info.estimate
@@ -235,7 +252,7 @@ def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: S
     if roll is not None and len(state.rolls) < 3 * ROLLS:
         state = replace(state, rolls=(*state.rolls, roll))
     own = info.seen.own_speed()
-    if own is not None and own[1] < OWN_SURE * own[0]:
+    if own is not None and own[1] < (2 if info.seen.is_free else 1) * OWN_SURE * own[0]:
         state = replace(state, ratios=learn_ratios(state.ratios, dive.evidence, own[0]))
     if params.learning is None or info.told is not None:
         return state

@@ -47,6 +47,9 @@ def why_unusable(samples: Samples, flight: Flight, start: Fix | None, end: Fix |
 
 def _blind(samples: Samples, flight: Flight) -> str:
     """Why the headings of a flight do not do; empty when they do."""
+    if not len(get(samples, "heading_e").between(flight.start, flight.end)):
+        # depth or pitch saw it dive: the current may still tell how fast
+        return "" if flight.evidence.startswith(("depth", "pitch")) else "no heading"
     gap = heading_gap(samples, flight)
     if gap > BLIND * flight.duration:
         return f"no heading for {gap / 3600:.1f} h"
@@ -73,8 +76,6 @@ def segment_notes(segment: Segment, declination: float | None, from_model: bool)
         notes.append("magnetic declination unknown: headings and currents are relative to magnetic north")
     elif from_model and segment.declination is not None:
         notes.append(f"magnetic declination from the model {segment.declination_source}")
-    if not len(segment.get("heading")) and len(segment.get("heading_commanded")):
-        notes.append("commanded heading used, the measured one is not in the file")
     return tuple(notes)
 
 
@@ -87,6 +88,12 @@ def flight_notes(flight: Flight, numbers: Mapping[str, float]) -> tuple[str, ...
         notes.append("the glider turned much: its speed is hardly observable")
     if "heading_gap_h" in numbers:
         notes.append(f"no heading for {numbers['heading_gap_h']:.1f} h of the dive: taken as steady")
+    if "heading_reckoned" in numbers:
+        notes.append("no measured heading in the file: direction of the dead-reckoned way used")
+    if "heading_commanded" in numbers:
+        notes.append("commanded heading used, the measured one is not in the file")
+    if "heading_assumed" in numbers:
+        notes.append("no heading in the file: a steady course is assumed, in the direction that the current leaves")
     if "unobserved_h" in numbers:
         notes.append(f"{numbers['unobserved_h']:.1f} h without data within the dive")
     return tuple(notes)
