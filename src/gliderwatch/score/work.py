@@ -152,7 +152,7 @@ def _replayed(
     request = Request((folder / "gliders",), (folder / "cache",), config)
     store = replay(request, on_file=on_file).store
     assessments = store.assessments(scenario.glider)
-    dives = _results(assessments, mission.truth)
+    dives = dive_results(assessments, mission.truth)
     upcoming = forecast_results(store.forecasts(scenario.glider), assessments, onset or math.inf)
     store.close()
     return Record(
@@ -190,7 +190,7 @@ def _openings(alerts: Iterable[Alert], on_shore: float) -> list[Told]:
     ]
 
 
-def _results(assessments: Iterable[Assessment], truth: Sequence[DiveTruth]) -> tuple[DiveResult, ...]:
+def dive_results(assessments: Iterable[Assessment], truth: Sequence[DiveTruth]) -> tuple[DiveResult, ...]:
     """The dives, each with the truth of the simulated one that it has most in common with."""
     return tuple(_result(a, _same(a, truth)) for a in assessments)
 
