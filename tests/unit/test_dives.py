@@ -124,7 +124,8 @@ class TestUnusable:
 
     def test_no_heading(self):
         _, (dive,) = told([with_samples(mission(LEGS)[0], heading=None)])
-        assert dive.reason == "no heading for 2.0 h" and dive.n_samples == 0
+        assert dive.reason == "" and dive.n_samples == 0  # depth and pitch tell how fast it was
+        assert dive.evidence["heading_assumed"] == 1.0
 
     def test_turning_with_few_headings(self):
         s = with_samples(
@@ -132,7 +133,8 @@ class TestUnusable:
             heading=[(START + 200, 0.0), (START + 8000, 1.5), (START + 21000, 3.0)],
         )
         _, (dive,) = told([s])
-        assert dive.reason.startswith("turning, and no heading for 3.6 h")
+        assert dive.evidence["heading_assumed"] == 1.0
+        assert any(note.startswith("headings missing") for note in dive.notes)
 
     def test_shorter_than_a_quarter_of_an_hour(self):
         _, dives = told(mission([Leg(hours=0.2), Leg(hours=0.24), Leg(hours=0.3)]))
@@ -156,10 +158,14 @@ class TestUnusable:
         identity = replace(last.id, opened_at=last.id.opened_at + 18000.0)
         last = replace(last, id=identity, last_t=last.last_t + 18000.0, quantities=later)
         here, there = START + 400.0, identity.opened_at + 30.0
+        skipped = replace(last, id=replace(identity, name=identity.name[:-1] + "7"))
         for north, n in ((0.02, 0), (2.0, 1)):
-            moved = fixes(last, (there, north), (there + 30.0, north + 0.002))
+            moved = fixes(skipped, (there, north), (there + 30.0, north + 0.002))
             _, dives = told([fixes(first, (START + 30.0, 0.0), (here, 0.003)), moved])
             assert [d.reason[:12] for d in dives] == ["data missing"] * n
+        # nor between a segment that ended at the surface and the next one of its mission: that is a call
+        adrift = fixes(last, (there, 2.0), (there + 30.0, 2.002))
+        assert told([fixes(first, (START + 30.0, 0.0), (here, 0.003)), adrift])[1] == []
 
     def test_mostly_at_the_surface(self):
         s = mission(LEGS)[0]

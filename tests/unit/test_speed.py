@@ -85,8 +85,8 @@ def test_lost_wing_is_told_where_it_rolls_the_glider():
 
 
 def test_roll_alone_is_no_anomaly():
-    made = ways(40, 6, lambda k: 0.9 * (k // 3))
-    _, verdicts = run(mission([w if k < 15 else replace(w, roll=0.4) for k, w in enumerate(made)]))
+    made = ways(64, 6, lambda k: 0.9 * (k // 3))  # from the fifth day on, when the tides of this sea are known
+    _, verdicts = run(mission([w if k < 36 else replace(w, roll=0.4) for k, w in enumerate(made)]))
     assert Flag.ANOMALY not in flags(verdicts)
 
 

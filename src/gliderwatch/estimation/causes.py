@@ -78,8 +78,9 @@ def switched(modes: tuple[Mode, ...], before: Mapping[Cause, float]) -> tuple[Mo
     )
 
 
-ROLLED = Mode(Cause.WING, 0.4, 0.3)
-"""Beside these where the glider has just begun to roll otherwise: ``size`` is of slip, a third of that of side."""
+ROLLED = Mode(Cause.WING, 9.0, 0.45)
+"""Beside these where the glider has just begun to roll otherwise, which little else does: nine to one. ``size`` is of
+slip, a third of that of side."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,8 @@ and how many times that does not add to the sum."""
 OWN_SURE = 0.15
 """Standard error of W on a dive, as part of it, up to which the dive tells what W is to what is reported."""
 NOT_SEEN = "it turned, and its heading is not in the file: the speed cannot be told"
+ROLL_CONFIRMS = 0.67
+"""Standard errors by which a speed must be below normal where the glider rolls otherwise for two dives: three to one."""
 HIDDEN = 0.1
 """Part of the speed that the glider believes, by which it must be slower to be slower than that."""
 ROLLED, ROLLS = 0.12, 5
@@ -183,7 +185,8 @@ def _slow_or_fast(
     if sigma_own > params.vague * normal.usual:
         return state, None, "the speed cannot be known: the glider turned too much"
     # what is common to all dives is also in a range that was learnt from them
-    sigma = params.confidence * (info.estimate.own_sigma if normal.dives else info.estimate.sigma)
+    sigma = info.estimate.own_sigma if normal.dives else info.estimate.sigma
+    sigma *= ROLL_CONFIRMS if state.rolled > 1 else params.confidence
     if info.estimate.speed + sigma < normal.low:
         # depth rate and pitch would be slow as well; where they are not sent a second dive has to be slow
         unseen = info.seen.is_free and (told is not None or not state.doubted)

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 from gliderwatch.model import Dive, Fix, Segment
-from gliderwatch.navigation.current import Known, Report, new_reports, pair, updated
+from gliderwatch.navigation.current import EARLY, Known, Report, new_reports, pair, updated
 from gliderwatch.navigation.fixes import FASTEST, SUSPECT, distance, new_fixes, stays
 from gliderwatch.navigation.flight import SPARSE, Flight, find_flight, lengthened, unseen
-from gliderwatch.navigation.quality import flight_notes, heading_gap, segment_notes, why_unusable
+from gliderwatch.navigation.quality import flight_notes, heading_gap, segment_notes, unsteered, why_unusable
 from gliderwatch.navigation.samples import Samples, after, concatenated, get, prepare
 from gliderwatch.navigation.track import attitude, build_track, evidence
 
@@ -36,7 +36,8 @@ class Navigation:
     ``fix`` is the last good one and ``carry`` the samples after it; ``declination`` (rad) the last known,
     ``declination_t`` when the glider told it (s; None: a model's); ``last_t`` the end of the
     latest segment (s); ``holes`` the times (start, end) since the fix of which no segment has come;
-    ``holder`` the segment that holds the flight since the fix; ``known`` the currents reported last and
+    ``calls`` those between two segments that follow each other, in which none is missing, and ``last_name`` the name of
+    the latest segment if it holds a whole flight and ends at the surface (else empty: it may break off); ``holder`` the segment that holds the flight since the fix; ``known`` the currents reported last and
     ``reports`` those whose dive is not told yet; ``dive`` the last whole dive, ``untold`` the
     surfacing (s) of a later one that is not told; ``notes`` on the data since the fix.
     """
@@ -47,6 +48,8 @@ class Navigation:
     declination_t: float | None = None
     last_t: float | None = None
     holes: tuple[tuple[float, float], ...] = ()
+    calls: tuple[tuple[float, float], ...] = ()
+    last_name: str = ""
     holder: str = ""
     known: Known = (None, None)
     reports: tuple[Report, ...] = ()
@@ -79,7 +82,8 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
         elif flight is not None and flight.duration >= DIP:
             untold.append(flight.end)
         holes = tuple((max(a, last.t), b) for a, b in state.holes if b > last.t)
-        state = replace(state, fix=last, holder=segment.id.name, holes=holes, notes=quality)
+        calls = tuple((a, b) for a, b in state.calls if b > last.t)
+        state = replace(state, fix=last, holder=segment.id.name, holes=holes, calls=calls, notes=quality)
 
     oldest = (state.last_t or 0.0) - LONGEST
     carry = after(samples, max(state.fix.t, oldest) if state.fix is not None else oldest)
@@ -88,7 +92,8 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
     waiting = [report for report in waiting if report.t > oldest]
     latest, later = (told[-1] if told else None), max(untold, default=None)
     later = later if later is not None and (latest is None or later > latest.t_surface) else None
-    state = replace(state, carry=carry, reports=tuple(waiting), dive=latest, untold=later)
+    name = state.last_name if under_way is None else ""
+    state = replace(state, carry=carry, reports=tuple(waiting), dive=latest, untold=later, last_name=name)
     news = [d for d in told if d is not before]
     if under_way is not None and under_way.duration >= SHORTEST:
         news.append(_dive(state, segment.id.glider, carry, under_way, None))
@@ -112,17 +117,36 @@ def _with_declination(state: Navigation, segment: Segment) -> Navigation:
 
 def _placed(state: Navigation, segment: Segment, fresh: Samples, quality: tuple[str, ...]) -> Navigation:
     """The state with the place of a segment in time: a hole before it, and whether it holds the flight."""
-    holes = state.holes
+    holes, calls = state.holes, state.calls
     if state.last_t is not None and segment.id.opened_at - state.last_t > SHORTEST:
-        holes = (*holes, (state.last_t, segment.id.opened_at))
+        gap = (state.last_t, segment.id.opened_at)
+        if follows(state.last_name, segment.id.name):
+            calls = (*calls, gap)
+        else:
+            holes = (*holes, gap)
     flies = find_flight(fresh, segment.id.opened_at - SPARSE, segment.last_t) is not None
     return replace(
         state,
         holes=holes,
+        calls=calls,
+        last_name=segment.id.name if flies else "",
         notes=tuple(dict.fromkeys(state.notes + quality)),
         last_t=max(segment.last_t, state.last_t or segment.last_t),
         holder=segment.id.name if flies or not state.holder else state.holder,
     )
+
+
+def follows(before: str, name: str) -> bool:
+    """Whether a segment is the next one of the same mission after another, so that none is missing between them.
+
+    >>> follows("unit-2024-120-3-7", "unit-2024-120-3-8"), follows("unit-2024-120-3-7", "unit-2024-120-3-9")
+    (True, False)
+    """
+    mission, _, number = name.rpartition("-")
+    mission_before, _, number_before = before.rpartition("-")
+    if not (number.isdecimal() and number_before.isdecimal() and mission == mission_before):
+        return False
+    return int(number) == int(number_before) + 1
 
 
 def _withdraw_old_fix(state: Navigation, fixes: list[Fix]) -> tuple[Navigation, list[Dive]]:
@@ -149,7 +173,8 @@ def _flight_since(state: Navigation, samples: Samples, end: Fix | None) -> Fligh
     if flight is None and state.fix is not None and (end is None or distance(state.fix, end) > SUSPECT):
         hidden = [(a, min(b, last)) for a, b in state.holes if min(b, last) - a >= HIDING]
         flight = Flight(*hidden[-1], evidence="missing") if hidden else None
-        if flight is None and end is not None and last - first >= HIDING:
+        called = sum(min(b, last) - max(a, first) for a, b in state.calls if a < last and b > first)
+        if flight is None and end is not None and last - first - called >= HIDING:
             flight = unseen(samples, first, last)
     return flight
 
@@ -167,6 +192,8 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
     else:
         track = build_track(samples, flight, start, end)
         numbers = evidence(samples, flight, track)
+        if unsteered(samples, flight) and "heading_reckoned" not in numbers:
+            numbers["heading_assumed"] = 1.0
         gap = heading_gap(samples, flight)
         numbers |= {"heading_gap_h": gap / 3600} if gap > 2 * SPARSE else {}
         numbers |= {"unobserved_h": missing / 3600} if missing else {}
@@ -191,16 +218,37 @@ def _with_currents(
 ) -> tuple[list[Dive], list[Report]]:
     """The dives with the currents published for them, and the reports of a dive that is not told yet.
 
-    `untold` are surfacings (s) of dives that are never told: their currents are nobody's.
+    `untold` are surfacings (s) of dives that are never told: their currents are nobody's. One that was published well
+    within a flight is that of a part of it, up to a surfacing without a fix: so is then the one at its end, and neither
+    is the current between the two fixes.
     """
+    flights = [(d.t_dive, d.t_surface, i) for i, d in enumerate(told)]
+    if under_way is not None:
+        flights.append((under_way.start, under_way.end, -1))
     ends: list[tuple[float, int | None]] = [(d.t_surface, i) for i, d in enumerate(told)]
     ends = sorted([*ends, *((t, None) for t in untold)], key=lambda end: end[0])
     surfaced = [t for t, _ in ends] + ([under_way.end] if under_way is not None else [])
     out, waiting = list(told), []
     for report, k in zip(reports, pair(reports, surfaced), strict=True):
+        part = next((i for a, b, i in flights if a + SPARSE < report.t < b - EARLY), None)
+        if part is not None:
+            if part < 0:
+                waiting.append(report)
+            else:
+                out[part] = _in_parts(out[part])
+            continue
         i = ends[k][1] if 0 <= k < len(ends) else None
         if k == len(ends):
             waiting.append(report)
-        elif i is not None and not out[i].reason.startswith("stale"):
+        elif i is not None and not out[i].reason.startswith("stale") and "surfacing_unseen" not in out[i].evidence:
             out[i] = replace(out[i], current=updated(out[i].current, report, out[i].t_surface))
     return out, waiting
+
+
+def _in_parts(dive: Dive) -> Dive:
+    """A dive in which the glider surfaced without a fix."""
+    if "surfacing_unseen" in dive.evidence:
+        return dive
+    note = "it surfaced without a fix on the way: the currents reported are those of parts of the dive"
+    evidence = MappingProxyType({**dive.evidence, "surfacing_unseen": 1.0})
+    return replace(dive, current=None, evidence=evidence, notes=(*dive.notes, note))

@@ -46,10 +46,12 @@ def why_unusable(samples: Samples, flight: Flight, start: Fix | None, end: Fix |
 
 
 def _blind(samples: Samples, flight: Flight) -> str:
-    """Why the headings of a flight do not do; empty when they do."""
-    if not len(get(samples, "heading_e").between(flight.start, flight.end)):
-        # depth or pitch saw it dive: the current may still tell how fast
-        return "" if flight.evidence.startswith(("depth", "pitch")) else "no heading"
+    """Why the headings of a flight do not do; empty when they do, or when depth or pitch tell how fast it was."""
+    return "" if flight.evidence.startswith(("depth", "pitch")) else unsteered(samples, flight)
+
+
+def unsteered(samples: Samples, flight: Flight) -> str:
+    """Why the course of a flight is not known from its headings; empty when it is."""
     gap = heading_gap(samples, flight)
     if gap > BLIND * flight.duration:
         return f"no heading for {gap / 3600:.1f} h"
@@ -93,7 +95,7 @@ def flight_notes(flight: Flight, numbers: Mapping[str, float]) -> tuple[str, ...
     if "heading_commanded" in numbers:
         notes.append("commanded heading used, the measured one is not in the file")
     if "heading_assumed" in numbers:
-        notes.append("no heading in the file: a steady course is assumed, in the direction that the current leaves")
+        notes.append("headings missing: a steady course is assumed, in the direction that the current leaves")
     if "unobserved_h" in numbers:
         notes.append(f"{numbers['unobserved_h']:.1f} h without data within the dive")
     return tuple(notes)
