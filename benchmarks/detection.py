@@ -25,8 +25,7 @@ import numpy as np
 from common import machine
 from flights import SEAS, read, various
 
-from gliderwatch.model import Assessment, Flag, Kind, Segment
-from gliderwatch.navigation.quality import NOT_SURFACED
+from gliderwatch.model import Assessment, Flag, Kind, Segment, Unusable
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, process
 from gliderwatch.score.graft import Graft, GraftKind, grafted, navigate, own_speeds
@@ -54,7 +53,7 @@ class Told:
     def after(self, t: float) -> list[Assessment]:
         """The dives that surfaced after a time (s) and are known to have ended, in order."""
         dives = [self.dives[at] for at in sorted(self.dives)]
-        return [a for a in dives if a.t_surface > t and a.reason != NOT_SURFACED]
+        return [a for a in dives if a.t_surface > t and a.unusable is not Unusable.NOT_SURFACED]
 
 
 @dataclass(frozen=True)

@@ -70,8 +70,7 @@ def navigated(segments: Sequence[Segment]) -> list[Dive]:
     for segment in segments:
         state, told = extend(state, segment)
         dives |= {dive.t_dive: dive for dive in told}
-    ended = [dives[t] for t in sorted(dives) if dives[t].end is not None]
-    return [replace(dive, evidence=dict(dive.evidence)) for dive in ended]  # so that another process takes it
+    return [dives[t] for t in sorted(dives) if dives[t].end is not None]
 
 
 def read(folder: Path, cache: Path) -> list[Segment]:
@@ -104,10 +103,7 @@ def fly(name: str, scenario: Scenario, params: SpeedParams = USUAL, roll: bool =
         write_mission(Path(folder) / "gliders", Path(folder) / "cache", mission)
         dives = navigated(read(Path(folder) / "gliders", Path(folder) / "cache"))
     if not roll:
-        dives = [
-            replace(d, evidence={k: v for k, v in d.evidence.items() if not k.startswith("roll")})
-            for d in dives
-        ]
+        dives = [replace(d, features=replace(d.features, roll_mean=None, roll_std=None)) for d in dives]
     truth = {dive.t_dive: same for dive in dives if (same := of(dive, mission.truth)) is not None}
     fault = scenario.faults[0] if scenario.faults else None
     kind = f"{fault.kind} {fault.size:g}" if fault else ""
@@ -213,15 +209,16 @@ def slowed(dive: Dive, part: float) -> Dive:
         return dive
     seen = observe(dive)
     own = seen.own_speed()
-    speed = own[0] if own and 0 < own[0] < 1.3 else dive.evidence.get("onboard_speed", 0.3)
+    speed = own[0] if own and 0 < own[0] < 1.3 else dive.features.onboard_speed or 0.3
     steps = dive.track.heading * np.diff(dive.track.t)[:, None]
     way = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
     names = ("depth_rate_dive", "depth_rate_climb", "onboard_speed")
-    slower = {name: (1 - part) * dive.evidence[name] for name in names if name in dive.evidence}
+    told = {name: getattr(dive.features, name) for name in names}
+    slower = {name: (1 - part) * value for name, value in told.items() if value is not None}
     return replace(
         dive,
         track=replace(dive.track, x=readonly(dive.track.x - part * speed * way)),
-        evidence={**dive.evidence, **slower},
+        features=replace(dive.features, **slower),
     )
 
 

@@ -154,9 +154,9 @@ def hidden(gliders: int) -> None:
 def turns(flown: Flown) -> bool:
     onset = flown.onset or 0.0
     seen = [
-        np.radians(d.evidence["heading_mean"])
+        d.features.heading_mean
         for d in flown.dives
-        if onset < d.t_dive < onset + 2 * DAY and "heading_mean" in d.evidence
+        if onset < d.t_dive < onset + 2 * DAY and d.features.heading_mean is not None
     ]
     apart = np.angle(np.exp(1j * np.subtract.outer(seen, seen)))
     return bool(np.abs(apart).max(initial=0.0) >= np.pi / 3)

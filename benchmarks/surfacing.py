@@ -28,7 +28,7 @@ from flights import read, various
 
 from gliderwatch.forecast.learning import ground, is_unseen
 from gliderwatch.forecast.surfacing import Surfacings
-from gliderwatch.model import Dive, Expected, Segment
+from gliderwatch.model import Dive, Expected, Segment, Unusable
 from gliderwatch.navigation.dives import Navigation, extend
 from gliderwatch.navigation.frame import to_plane
 from gliderwatch.params import GliderParams
@@ -85,7 +85,8 @@ def scores(segments: Sequence[Segment]) -> np.ndarray:
         then = following.get(forecast.dive.t_dive)
         if then is None or then.end is None:
             continue
-        if forecast.at < then.t_surface and not is_unseen(then) and not then.reason.startswith("stale"):
+        is_stale = then.unusable is Unusable.STALE_FIX
+        if forecast.at < then.t_surface and not is_unseen(then) and not is_stale:
             rows.append(row(forecast, then))
     return np.array(rows, dtype=np.float64).reshape(-1, 7)
 

@@ -122,7 +122,7 @@ WORDS = {
     None: "no flag yet (warming up)",
     0: "flag 0, normal",
     1: "flag 1, anomaly",
-    2: "flag 2, false alarm",
+    2: "flag 2, measurements disagree",
 }
 
 

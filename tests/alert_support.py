@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
-from gliderwatch.alerts.outbox import OutboxRow
+from gliderwatch.alerts.outbox import Delivery, OutboxRow
 from gliderwatch.model import Alert, Assessment, Incident, Kind, Severity
 
 DIVE = 1667639520.0  # 2022-11-05 09:12 UTC
@@ -165,7 +165,13 @@ class MemoryStore:
             self.errors.append((row_id, error, next_try))
 
     def refused(
-        self, row_id: int, error: str, now: float, report: Alert | None, channels: Iterable[str]
+        self,
+        row_id: int,
+        delivery: Delivery,
+        error: str,
+        now: float,
+        report: Alert | None,
+        channels: Iterable[str],
     ) -> None:
         with self.lock:
             self._use()

@@ -56,7 +56,7 @@ class World:
 
     def last_surfacing(self, until: float) -> Assessment | None:
         """The last dive that surfaced until a time."""
-        ended = [a for a in self.dives.values() if a.t_surface <= until and a.reason != "no fix"]
+        ended = [a for a in self.dives.values() if a.t_surface <= until and a.unusable is None]
         return max(ended, key=lambda a: a.t_surface, default=None)
 
 

@@ -32,6 +32,8 @@ def misbehave(path: Path, cache_folders: Sequence[Path]) -> object:
             raise IndexError("index 9 is out of bounds")
         case "exits":
             raise SystemExit(1)
+        case "program":
+            return _Program(path)
         case "slow":
             time.sleep(0.2)
             raise Quarantine("slow")
@@ -40,6 +42,16 @@ def misbehave(path: Path, cache_folders: Sequence[Path]) -> object:
         case _:
             return decode(path, cache_folders)
     return None
+
+
+class _Program:
+    """Writes a file beside another when it is unpickled."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def __reduce__(self) -> object:
+        return Path.touch, (self._path.with_suffix(".written"),)
 
 
 def _hang() -> None:

@@ -77,11 +77,11 @@ def median_misfit(segments: Sequence[Segment], *, rotate_heading: bool, rotate_c
         dives |= {d.t_dive: d for d in told}
     out = []
     for dive in dives.values():
-        if dive.track is None or dive.current is None or "onboard_speed" not in dive.evidence:
+        if dive.track is None or dive.current is None or dive.features.onboard_speed is None:
             continue
         found = closure(dive.track, dive.current)
-        along = found["along_speed"] - dive.evidence["onboard_speed"]
-        out.append(float(np.hypot(along, found["across_misfit"])))
+        along = found.along_speed - dive.features.onboard_speed
+        out.append(float(np.hypot(along, found.across_misfit)))
     return float(np.median(out))
 
 

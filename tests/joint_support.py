@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gliderwatch.model import Current, Dive, Fix, Track, readonly
+from gliderwatch.model import Current, Dive, DiveFeatures, Fix, Track, readonly
 from gliderwatch.navigation.frame import from_plane
 
 START = 1_700_000_000.0
 HOUR, DAY = 3600.0, 86400.0
 LAT, LON = 27.5, -84.0
-EVIDENCE = {"pitch_dive": -0.45, "pitch_climb": 0.45, "roll_mean": 0.0, "duration_h": 3.0}
+FEATURES = DiveFeatures(duration=3 * HOUR, pitch_dive=-0.45, pitch_climb=0.45, roll_mean=0.0)
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def dive(k: int, way: Way, hours: float = 3.0, samples: int = 24, start: Fix | N
         current=None if way.wrong is None else Current(*(reported + way.wrong).tolist(), final=True),
         reason="",
         n_samples=samples,
-        evidence={**EVIDENCE, "duration_h": hours, "roll_mean": way.roll, "thruster": way.thruster},
+        features=replace(FEATURES, duration=hours * HOUR, roll_mean=way.roll, thruster=way.thruster),
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 class GliderwatchError(Exception):
     """Everything gliderwatch raises on purpose; its text is fit for a user."""
@@ -14,20 +16,26 @@ class Retry(GliderwatchError):
 class MissingCache(Retry):
     """A file with a factored header whose sensor list (cache file) is not there yet.
 
-    ``crc`` is the checksum that names the cache file, lower case, without a suffix.
+    ``crc`` is the checksum that names the cache file, lower case, without a suffix; ``folders`` are those
+    where it was looked for.
     """
 
-    def __init__(self, crc: str) -> None:
-        super().__init__(f"cache file {crc}.cac is missing")
-        self.crc = crc
+    def __init__(self, crc: str, folders: Iterable[object] = ()) -> None:
+        self.crc, self.folders = crc, tuple(map(str, folders))
+        where = f"not in {', '.join(self.folders)}" if self.folders else "no folder is searched"
+        super().__init__(f"cache file {crc}.cac is missing: {where}")
 
-    def __reduce__(self) -> tuple[type[MissingCache], tuple[str]]:
+    def __reduce__(self) -> tuple[type[MissingCache], tuple[str, tuple[str, ...]]]:
         """What it is made of, so that it comes whole out of a worker process."""
-        return type(self), (self.crc,)
+        return type(self), (self.crc, self.folders)
 
 
 class Quarantine(GliderwatchError):
     """The input will never be good as it is: note the reason, leave the file alone, go on."""
+
+
+class NotAssessed(Quarantine):
+    """The input could be read, but gliderwatch failed to assess it: a fault of its own."""
 
 
 class ConfigError(GliderwatchError):
@@ -40,3 +48,7 @@ class StateError(GliderwatchError):
 
 class DamagedError(StateError):
     """What the state file holds is not what was written: it has to be set aside and made anew."""
+
+
+class LayoutError(StateError):
+    """What the state file holds is whole, but no value that this gliderwatch knows: it is left as it is."""

@@ -87,6 +87,17 @@ class Segment:
         return self.quantities.get(name, EMPTY)
 
 
+class Hindrance(StrEnum):
+    """Why a file was not taken, for decisions."""
+
+    NO_CACHE = "no_cache"
+    UNREADABLE = "unreadable"
+    GONE = "gone"
+    RENAMED = "renamed"
+    DAMAGED = "damaged"
+    NOT_ASSESSED = "not_assessed"
+
+
 # --------------------------------------------------------------------------- navigation
 
 
@@ -122,13 +133,70 @@ class Current:
     final: bool
 
 
+class Unusable(StrEnum):
+    """Why the speed on a dive can not be estimated: for decisions. The words beside it have the numbers."""
+
+    NOT_SURFACED = "not_surfaced"
+    NO_FIX_BEFORE = "no_fix_before"
+    DATA_MISSING = "data_missing"
+    SURFACE_DRIFT = "surface_drift"
+    WILD_FIX = "wild_fix"
+    STALE_FIX = "stale_fix"
+    NO_HEADING = "no_heading"
+    TURNING = "turning"
+
+
+@dataclass(frozen=True, slots=True)
+class DiveFeatures:
+    """What the files say of how a dive was flown: the numbers that decisions read. None where unknown.
+
+    Times in s: ``duration`` of the flight, ``fix_gap`` from its end to the fix after it, ``drift`` at the
+    surface between both fixes, ``heading_gap`` the longest time without a heading where that is long,
+    ``unobserved`` the time without any data. ``ground_speed`` between the fixes and ``onboard_speed``, the
+    mean of what the glider believes, in m/s. ``heading_steadiness`` is the length of the mean heading vector
+    in flight (0: circled, 1: straight), ``heading_mean`` its direction (rad, clockwise from north),
+    ``heading_commanded`` the part of headings that were commanded, not measured; ``heading_reckoned``: none were
+    measured, the dead-reckoned way has the shape of the dive; ``heading_assumed``: nothing tells the course. In a dive
+    with ``surfacing_unseen`` the glider surfaced without a fix. ``depth_max`` in m; means of
+    ``pitch_dive``, ``pitch_climb``, ``roll_mean`` and the spread ``roll_std`` in rad, nose up and to
+    starboard positive; ``thruster`` the part of the time that it was on; ``depth_rate_dive`` and
+    ``depth_rate_climb`` in m/s, down positive; ``yos`` turns from dive to climb; ``ballast_dive`` and
+    ``ballast_climb`` the volume pumped (m3); ``vacuum`` in Pa.
+    """
+
+    duration: float
+    fix_gap: float | None = None
+    drift: float | None = None
+    ground_speed: float | None = None
+    heading_steadiness: float | None = None
+    heading_mean: float | None = None
+    heading_commanded: float = 0.0
+    heading_reckoned: bool = False
+    heading_assumed: bool = False
+    surfacing_unseen: bool = False
+    depth_max: float | None = None
+    pitch_dive: float | None = None
+    pitch_climb: float | None = None
+    roll_mean: float | None = None
+    roll_std: float | None = None
+    onboard_speed: float | None = None
+    thruster: float | None = None
+    depth_rate_dive: float | None = None
+    depth_rate_climb: float | None = None
+    yos: int | None = None
+    ballast_dive: float | None = None
+    ballast_climb: float | None = None
+    vacuum: float | None = None
+    heading_gap: float | None = None
+    unobserved: float = 0.0
+
+
 @dataclass(frozen=True, slots=True)
 class Dive:
     """What happened between the fix before and the fix after one dive.
 
-    ``reason`` is empty when the dive can be used for estimation; otherwise it says in words why
-    not ("no fix", "no heading", "data missing"), and ``track`` is None. ``evidence`` holds
-    numbers that speak for or against a fault (`docs/nomenclature.md`), None-free.
+    ``unusable`` is None and ``reason`` empty when the dive can be used for estimation; otherwise they say
+    why not, for decisions and in words, and ``track`` is None.
     """
 
     glider: str
@@ -141,8 +209,9 @@ class Dive:
     current: Current | None
     reason: str
     n_samples: int
-    evidence: Mapping[str, float]
+    features: DiveFeatures
     notes: tuple[str, ...] = ()
+    unusable: Unusable | None = None
 
 
 # --------------------------------------------------------------------------- results
@@ -160,7 +229,8 @@ class Flag(IntEnum):
 class Assessment:
     """What gliderwatch says of one dive. Fields: `docs/nomenclature.md`.
 
-    ``reason`` says in words why there is no flag, or what a flag other than 0 means here.
+    ``reason`` says in words why there is no flag, or what a flag other than 0 means here; ``unusable`` is
+    that of the dive.
     """
 
     glider: str
@@ -187,6 +257,7 @@ class Assessment:
     evidence: Mapping[str, float]
     notes: tuple[str, ...]
     parameters: str
+    unusable: Unusable | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,6 +297,7 @@ class Kind(StrEnum):
     REMINDER = "reminder"
     CORRECTION = "correction"
     OVERDUE = "overdue"
+    UNKNOWN = "unknown"
     SURFACING = "surfacing"
     OPERATOR = "operator"
 

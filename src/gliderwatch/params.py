@@ -31,8 +31,6 @@ class LearnerParams:
     """Phase of the basis functions (rad)."""
     max_speed: float | None = None
     """Speed at which the glider's through-water speed saturates (m/s); None: it does not."""
-    flow_gain: float = 1 / 3600
-    """Rate (1/s) at which the estimator `composite` draws the learnt flow to the reference."""
     centres: tuple[tuple[float, float], ...] = ()
     """Planned centres (latitude, longitude in degrees); empty: grown along the way."""
 
@@ -74,7 +72,7 @@ class GliderParams:
     speed_max: float = 0.75
     speed_learnt: bool = True
     """Whether a range learnt from the first healthy dives takes the place of the two above."""
-    estimator: Literal["joint", "adaptive", "composite"] = "joint"
+    estimator: Literal["joint", "adaptive"] = "joint"
     reference: Literal["dac", "tides", "learnt", "model"] = "dac"
     """The flow F_M that the estimated one is compared with."""
     gamma_f: float = 0.3
@@ -89,7 +87,7 @@ class GliderParams:
 
 @dataclass(frozen=True, slots=True)
 class Attention:
-    """How a glider's silence is taken, and until when it is not spoken of.
+    """When a glider's silence, or dives that cannot be judged, are spoken of, and until when nothing is.
 
     Apart from `GliderParams`: it changes nothing that is estimated, so it leaves their hash as it is.
     """
@@ -100,6 +98,10 @@ class Attention:
     """Time (s) until which nothing is told of it."""
     recovered: bool = False
     """Whether it is out of the water: nothing is told of it."""
+    unknown_hours: float | None = 24.0
+    """Hours without a dive that could be judged after which that is told; None: hours do not count."""
+    unknown_dives: int | None = 8
+    """Dives in a row that could not be judged after which that is told; None: their number does not count."""
 
     def is_quiet(self, now: float) -> bool:
         """Whether nothing is told of it at a time (s)."""

@@ -18,7 +18,7 @@ from gliderwatch.run.status import GliderStatus, Overview
 from gliderwatch.store.sqlite import File, Status
 
 _FLAGS = {Flag.NORMAL: "[green]0 normal[/]", Flag.ANOMALY: "[bold red]1 anomaly[/]"}
-_FALSE = "[yellow]2 false alarm[/]"
+_FALSE = "[yellow]2 measurements disagree[/]"
 _STYLES = {Severity.CRITICAL: "bold red", Severity.WARNING: "yellow", Severity.INFO: "cyan"}
 
 

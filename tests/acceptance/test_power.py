@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sqlite3
+import zlib
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -142,6 +143,33 @@ def test_damage_found_while_it_runs_ends_it_in_words_and_the_next_start_makes_it
     out = site.config.with_name("out")
     assert command("run", "-c", site.config, "--replay", site.root, "--out", out).returncode == 0
     assert results(site.state) == results(out / "replay.sqlite")
+
+
+def test_a_record_of_a_type_that_is_not_known_is_no_damage_and_sets_nothing_aside(site: Site) -> None:
+    """A mistake of a release: the file stays, the service says so, and the release that wrote it goes on."""
+    early, late = FILES[:4], FILES[4:]
+    with Daemon(site) as daemon:
+        put(site, *early)
+        taken(site, *early)
+        assert daemon.stop() == 0
+        with closing(sqlite3.connect(site.state)) as db:
+            good = db.execute("SELECT checkpoint, name FROM segments").fetchall()
+            odd = zlib.compress(
+                zlib.decompress(good[0][0]).replace(b'"navigation":{', b'"navigation":3,"x":{', 1)
+            )
+            db.execute("UPDATE segments SET checkpoint = ?", (odd,))
+            db.commit()
+        daemon.start().ready()
+        put(site, *late)
+        until(lambda: daemon.log("state cannot be used, tried again"), "said")
+        assert asides(site.state) == [] and daemon.stop() == 0
+        with closing(sqlite3.connect(site.state)) as db:
+            db.executemany("UPDATE segments SET checkpoint = ? WHERE name = ?", good)
+            db.commit()
+        daemon.start().ready()
+        taken(site, *FILES)
+        assert daemon.stop() == 0
+    assert TRACEBACK not in daemon.text()
 
 
 def test_a_message_that_waited_in_a_damaged_file_is_sent(bruce: Site) -> None:

@@ -29,7 +29,7 @@ from gliderwatch.simulate.dockserver import FileForm, Names, write_mission
 
 FLIGHT = {".sbd", ".scd", ".mbd", ".mcd", ".dbd", ".dcd"}
 NUMBERS = ("lat", "lon", "speed", "flow_u", "flow_v", "reference_u", "reference_v", "p_e", "clle_max")
-KINDS = {"anomaly", "overdue", "false_alarm", "all_clear", "reminder", "correction", "surfacing", "operator"}
+KINDS = {"anomaly", "overdue", "false_alarm", "unknown", "all_clear", "reminder", "correction", "surfacing"}
 
 
 def counts(text: str) -> dict[str, int]:

@@ -41,7 +41,7 @@ def dives(data, name):
     for dive in (found[t_dive] for t_dive in sorted(found)):
         within = on[(t >= dive.t_dive) & (t <= dive.t_surface)]
         more = {"thruster": float(within.mean())} if len(within) > 2 else {}
-        out.append(replace(dive, evidence={**dive.evidence, **more}))
+        out.append(replace(dive, features=replace(dive.features, **more)))
     return tuple(out)
 
 
@@ -67,12 +67,13 @@ def slowed(dive, part):
     if dive.track is None:
         return dive
     own = observe(dive).own_speed()
-    speed = own[0] if own and 0 < own[0] < 1.3 else dive.evidence.get("onboard_speed", 0.3)
+    speed = own[0] if own and 0 < own[0] < 1.3 else dive.features.onboard_speed or 0.3
     steps = dive.track.heading * np.diff(dive.track.t)[:, None]
     way = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
     track = replace(dive.track, x=readonly(dive.track.x - part * speed * way))
-    slower = {name: (1 - part) * dive.evidence[name] for name in PROPORTIONAL if name in dive.evidence}
-    return replace(dive, track=track, evidence={**dive.evidence, **slower})
+    told = {name: getattr(dive.features, name) for name in PROPORTIONAL}
+    slower = {name: (1 - part) * value for name, value in told.items() if value is not None}
+    return replace(dive, track=track, features=replace(dive.features, **slower))
 
 
 @pytest.fixture(params=REAL)
@@ -151,11 +152,11 @@ def test_depth_rate_over_pitch_and_mean_on_board_keep_to_the_own_speed(shared_da
     _, verdicts = run(made)
     own = {k: verdicts[k].info.seen.own_speed() for k in late(made) if verdicts[k].flag is Flag.NORMAL}
     sure = {k: each[0] for k, each in own.items() if each is not None and each[1] < 0.1 * each[0]}
-    sure = {k: own for k, own in sure.items() if made[k].evidence["duration_h"] > 1.0}
+    sure = {k: own for k, own in sure.items() if made[k].features.duration > HOUR}
     assert sure
     told = {
-        "vertical": [v / w for k, w in sure.items() if (v := vertical(made[k].evidence)) is not None],
-        "on board": [v / w for k, w in sure.items() if (v := made[k].evidence.get("onboard_speed"))],
+        "vertical": [v / w for k, w in sure.items() if (v := vertical(made[k].features)) is not None],
+        "on board": [v / w for k, w in sure.items() if (v := made[k].features.onboard_speed)],
     }
     assert any(told.values())
     for source, (low, high) in {"vertical": (1.1, 1.25), "on board": (0.95, 1.1)}.items():
@@ -179,7 +180,7 @@ def test_speed_in_spirals_is_that_of_depth_rate_and_pitch(shared_data):
 def test_spirals_say_that_the_speed_cannot_be_known(shared_data):
     """Where no depth rate and no mean speed is sent."""
     made = [
-        replace(d, evidence={k: v for k, v in d.evidence.items() if k not in PROPORTIONAL})
+        replace(d, features=replace(d.features, **dict.fromkeys(PROPORTIONAL)))
         for d in dives(shared_data, "maria-2022")
     ]
     _, verdicts = run(made)

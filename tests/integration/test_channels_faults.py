@@ -234,15 +234,16 @@ def test_a_slow_channel_delays_no_other(state: Path) -> None:
         assert not slow.ids and took < 3.0
 
 
-def test_one_row_that_cannot_be_read_blocks_nothing(state: Path) -> None:
+@pytest.mark.parametrize(("text", "why"), [("{", "damaged"), ("{}", "cannot read")])
+def test_one_row_that_cannot_be_read_blocks_nothing(state: Path, text: str, why: str) -> None:
     with closing(Store.open(state)) as store, closing(Outbox(state)) as outbox:
         for name in "ab":
             store.post(alert(name, incident="i"), ["mail"], 0.0)
-        store._db.execute("UPDATE alerts SET data = '{}' WHERE id = 'a'")
+        store._db.execute("UPDATE alerts SET data = ? WHERE id = 'a'", (text,))
         assert outbox.due(1.0) == []  # the first is given up, the second of its thread comes next
         assert [row.alert.id for row in outbox.due(1.0)] == ["b"]
         (told,) = store.refused(0.0)
-        assert told.alert == "a" and "damaged" in told.error
+        assert told.alert == "a" and why in told.error
 
 
 def test_messages_for_a_channel_that_was_taken_out_wait_and_come_when_it_is_back(

@@ -315,6 +315,7 @@ def test_errors_come_whole_out_of_a_worker(station):
         ("memory", Quarantine, "memory"),
         ("error", Quarantine, "IndexError: index 9 is out of bounds"),
         ("exits", Quarantine, "SystemExit"),
+        ("program", Quarantine, "no segment but _Program"),
     ],
 )
 def test_whatever_a_file_does_to_a_worker_the_next_one_is_decoded(station, name, error, says):
@@ -325,6 +326,7 @@ def test_whatever_a_file_does_to_a_worker_the_next_one_is_decoded(station, name,
         with pytest.raises(error, match=says):
             bad.result(20)
         assert good.result(20).completeness[1] == 60
+    assert not path.with_name("program.written").exists(), "the daemon ran what a worker made"
 
 
 def test_a_worker_that_dies_idle_is_replaced(station):

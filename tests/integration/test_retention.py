@@ -1,6 +1,8 @@
 """What is old is removed: never what is open, what is to be told, or what a late file still needs."""
 
+import json
 import shutil
+import zlib
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -11,13 +13,16 @@ from acceptance.support import Daemon, until
 from alert_support import alert
 from gliderwatch.model import SegmentId
 from gliderwatch.params import GliderParams
+from gliderwatch.pipeline import GliderState
 from gliderwatch.rules.announce import Said
 from gliderwatch.run import intake
 from gliderwatch.run.intake import Speaking
-from gliderwatch.store import retention
+from gliderwatch.run.posting import post_alerts
+from gliderwatch.run.retention import DAY, HOUR, Retention
+from gliderwatch.store import conversion, retention
+from gliderwatch.store.conversion import moved
 from gliderwatch.store.damage import damage
 from gliderwatch.store.outbox import Outbox
-from gliderwatch.store.retention import DAY, HOUR, Retention
 from gliderwatch.store.segments import RECENT
 from gliderwatch.store.sqlite import File, Status, Store
 from missions import Leg, ending, feed, mission, opened
@@ -107,6 +112,43 @@ def test_the_first_checkpoint_is_not_thinned_out(store):
     assert store._db.execute(sql, (first,)).fetchone()[0] == 1
 
 
+def test_a_first_checkpoint_that_is_gone_keeps_all_until_the_next_file_makes_it_again(store):
+    """As a migration left it that set all checkpoints to NULL: no error in each hour's removal."""
+    made = mission([*LEGS, replace(HEALTHY, heading=1.0)])
+    clear(store)
+    store._db.execute("UPDATE segments SET checkpoint = NULL")
+    before = content(store)
+    assert clear(store) == 0 and content(store) == before
+    feed(made[len(LEGS) :], PARAMS, ALL, store)
+    first = store._db.execute("SELECT checkpoint FROM segments ORDER BY opened_at LIMIT 1").fetchone()[0]
+    assert first is not None
+    clear(store)
+
+
+def test_a_state_that_changed_its_shape_is_gone_on_from_as_if_it_had_not(store, monkeypatch):
+    """The first segment that is kept holds what cannot be made again: all that was learnt before it."""
+    more = [*LEGS, *(replace(HEALTHY, heading=1.0 + k) for k in range(4))]
+    clear(store)
+    for name, record in store._db.execute("SELECT name, checkpoint FROM segments").fetchall():
+        if record is not None:
+            data = json.loads(zlib.decompress(record))["data"]
+            data["older"] = {"after": data.pop("settled"), "dive": data.pop("last")}
+            old = zlib.compress(json.dumps({"v": 1, "data": data}).encode())
+            store._db.execute("UPDATE segments SET checkpoint = ? WHERE name = ?", (old, name))
+
+    def flat(state):
+        moved(state, "older.after", "settled")
+        moved(state, "older.dive", "last")
+        return state
+
+    monkeypatch.setattr(conversion, "CONVERTERS", {GliderState: (flat,)})
+    assert clear(store, CUT + DAY) > 0, "the removal reads the first checkpoint"
+    feed(mission(more)[len(LEGS) :], PARAMS, ALL, store)
+    full = feed(mission(more), PARAMS, ALL)
+    assert ending(store, "unit").state == ending(full, "unit").state
+    assert tail(store, CUT + DAY) == tail(full, CUT + DAY) != []
+
+
 def test_an_incident_that_is_over_goes_with_what_was_said_of_it(store):
     told = len(store.alerts())
     assert told == 2  # the alarm and the all-clear
@@ -137,7 +179,7 @@ def test_an_end_that_was_not_told_keeps_its_incident(store):
     (thread,) = said.threads
     open_ = replace(thread, told=replace(thread.told, cleared_at=None))
     with store.transaction():
-        store.say("unit", replace(said, threads=(open_,)), (), lambda alert: (), 0.0)
+        post_alerts(store, "unit", replace(said, threads=(open_,)), (), lambda alert: (), 0.0)
     clear(store)
     assert len(store.incidents("unit")) == 1
     assert [a.kind for a in intake.speak(store, "unit", PARAMS, ALL, 0.0)] == ["all_clear"]
@@ -326,7 +368,7 @@ class TestDaily:
 def test_said_of_a_glider_without_incidents_is_left_alone(store):
     said = Said(surfaced=5.0)
     with store.transaction():
-        store.say("unit", replace(store.said("unit"), surfaced=5.0), (), lambda alert: (), 0.0)
+        post_alerts(store, "unit", replace(store.said("unit"), surfaced=5.0), (), lambda alert: (), 0.0)
     clear(store)
     assert store.said("unit") == said
 

@@ -80,32 +80,6 @@ def test_without_motion_the_lyapunov_function_never_grows(state, track, params):
         assert distance(state, params) <= before * (1 + 1e-9)
 
 
-@given(states(), tracks(moving=False), gains(), numbers(1e-6, 0.1))
-def test_nor_does_it_while_the_flow_is_drawn_to_none(state, track, params, flow_gain):
-    """Composite adaptation is unconditionally stable too: the pull only takes from the Lyapunov function."""
-    t, x, heading = track
-    params = replace(params, flow_gain=flow_gain)
-    for i in range(len(heading)):
-        before = distance(state, params)
-        piece = t[i : i + 2], x[i : i + 2], heading[i : i + 1]
-        state, _ = advance(state, *piece, params.basis(CENTRES), params, (0.0, 0.0))
-        assert distance(state, params) <= before * (1 + 1e-9)
-
-
-@given(states(), tracks(), gains(), numbers(1e-5, 0.01), numbers(0.05, 0.95))
-def test_a_pulled_track_in_two_calls_equals_one(state, track, params, flow_gain, where):
-    t, x, heading = track
-    params, k = replace(params, flow_gain=flow_gain), int(where * len(heading))
-    basis, dac = params.basis(CENTRES), (0.2, -0.1)
-    whole, _ = advance(state, t, x, heading, basis, params, dac)
-    half, _ = advance(state, t[: k + 1], x[: k + 1], heading[:k], basis, params, dac)
-    both, _ = advance(half, t[k:], x[k:], heading[k:], basis, params, dac)
-    scale = 1.0 + float(np.abs(whole.e).max())
-    assert np.allclose(both.e, whole.e, rtol=1e-9, atol=1e-9 * scale)
-    assert np.allclose(both.xi, whole.xi, rtol=1e-9, atol=1e-9)
-    assert math.isclose(both.speed, whole.speed, rel_tol=1e-9, abs_tol=1e-9)
-
-
 @given(states(), states(), tracks(), gains(), numbers(-2.0, 2.0))
 def test_superposition(one, other, track, params, share):
     """On one track the end is an affine function of the start."""

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from gliderwatch.currents import augmented
 from gliderwatch.currents.augmented import Parameters
 from gliderwatch.currents.constituents import HOUR, Constituent
-from gliderwatch.currents.state import Currents, displacement, learn, predict
+from gliderwatch.currents.state import Currents, learn, predict
 from gliderwatch.model import readonly
 from gliderwatch.store import codec
 
@@ -35,9 +35,8 @@ def test_forecasts_are_finite_and_their_covariances_are_covariances(mission, ahe
     for each in in_time(mission):
         state = learn(state, *each)
     told = predict(state, state.end + ahead, state.end + ahead + lasts)
-    moved = displacement(state, state.end + ahead, state.end + ahead + lasts)
-    assert np.isfinite(told.flow).all() and np.isfinite(moved.x).all()
-    assert np.linalg.eigvalsh(told.cov).min() > 0 and np.linalg.eigvalsh(moved.cov).min() > 0
+    assert np.isfinite(told.flow).all()
+    assert np.linalg.eigvalsh(told.cov).min() > 0
     assert (told.cov == told.cov.T).all() or np.abs(told.cov - told.cov.T).max() < 1e-12
     for bank in (state.filters.plain, state.filters.tidal):
         assert all(np.isfinite(x).all() for x in (bank.mean, bank.cov, bank.fit, bank.scale))

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from gliderwatch.forecast.state import LEAST, MOST, factor
 from gliderwatch.forecast.surfacing import Surfacings, expect, learn
 from gliderwatch.forecast.timing import KEPT, usual
-from gliderwatch.model import Dive
+from gliderwatch.model import Dive, Unusable
 from gliderwatch.navigation.frame import from_plane
 from gliderwatch.store import codec
 from joint_support import HOUR, LAT, LON, Way, mission
@@ -41,7 +41,7 @@ def torn(dive: Dive, rng: np.random.Generator) -> Dive:
     if luck < 0.1:
         return replace(dive, track=None, reason="no heading for 2.0 h")
     if luck < 0.2:
-        return replace(dive, track=None, current=None, reason="stale fix")
+        return replace(dive, track=None, current=None, unusable=Unusable.STALE_FIX)
     if luck < 0.3:
         return replace(dive, start=None, track=None, reason="no fix")
     if luck < 0.4:

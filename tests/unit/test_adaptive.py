@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from gliderwatch.estimation.adaptive import AdaptiveParams, advance, euler_step, init, with_basis
+from euler import euler_step
+from gliderwatch.estimation.adaptive import AdaptiveParams, advance, init, with_basis
 from gliderwatch.estimation.basis import phi
 from gliderwatch.model import readonly
 
@@ -38,11 +39,11 @@ def steady(hours, velocity, heading, spacing=60.0):
     return t, t[:, None] * np.array(velocity), np.tile(np.array(heading, dtype=float), (len(t) - 1, 1))
 
 
-def runge_kutta(state, track, basis, params, dt=4.0, reference=None):
+def runge_kutta(state, track, basis, params, dt=4.0):
     """The equations of 001 themselves, with (7), (9), (25), (27), (28), by steps of at most dt.
 
-    With beta as (9) has it, phi at the estimated place comes and goes again: it is left out. The flow is
-    drawn to a reference while the glider flies. Returns e, e_delta, xi, V_L as one vector and the greatest
+    With beta as (9) has it, phi at the estimated place comes and goes again: it is left out.
+    Returns e, e_delta, xi, V_L as one vector and the greatest
     |e|. Of fourth order: half the step makes less of a difference than a tenth of any accuracy asked for.
     """
     t, x, heading = track
@@ -56,8 +57,6 @@ def runge_kutta(state, track, basis, params, dt=4.0, reference=None):
         delta = (min(v, u_0) - v) * psi - params.k * e_delta
         eps = e - e_delta
         xi_rate = params.gamma * np.outer(eps, at_x)
-        if reference is not None and psi.any():
-            xi_rate += params.flow_gain * np.outer(reference - xi @ at_x, at_x) / (at_x @ at_x)
         return np.concatenate([z_rate, delta, xi_rate.ravel(), [g * eps @ psi]])
 
     y = np.concatenate([x[0] - state.e, state.e_delta, state.xi.ravel(), [state.speed]])
@@ -123,92 +122,6 @@ def test_saturation_against_the_paper_s_equations(spacing, metres, speeds, limit
     assert got.e_delta == pytest.approx(want[2:4], abs=metres)
     assert got.xi.ravel() == pytest.approx(want[4:-1], abs=speeds)
     assert got.speed == pytest.approx(want[-1], abs=speeds)
-
-
-COMPOSITE = replace(TABLE_I, flow_gain=1 / 3600)
-DAC = (0.12, -0.07)
-
-
-# as without a reference, the only error is that of phi held within a substep
-@pytest.mark.parametrize(
-    ("spacing", "metres", "speeds"), [(4.0, 1e-4, 1e-7), (60.0, 0.01, 1e-5), (1800.0, 0.1, 1e-5)]
-)
-@pytest.mark.parametrize("limit", [None, 0.2])
-def test_the_pull_against_its_equations_integrated_finely(spacing, metres, speeds, limit):
-    params = replace(COMPOSITE, max_speed=limit)
-    basis, (t, x, heading) = params.basis(CENTRES), turning(spacing)
-    heading = np.where((np.arange(len(heading)) < 0.1 * len(heading))[:, None], 0.0, heading)
-    want, _ = runge_kutta(start(), (t, x, heading), basis, params, reference=DAC)
-    got, _ = advance(start(), t, x, heading, basis, params, DAC)
-    assert got.e == pytest.approx(want[:2], abs=metres)
-    assert got.xi.ravel() == pytest.approx(want[4:-1], abs=speeds)
-    assert got.speed == pytest.approx(want[-1], abs=speeds)
-
-
-def test_euler_converges_to_the_pulled_flow():
-    """At half the step half the error: the splitting into substeps adds none that does not vanish."""
-    basis, (t, x, heading) = COMPOSITE.basis(CENTRES), turning(4.0, hours=2.0)
-    got, _ = advance(start(), t, x, heading, basis, COMPOSITE, DAC)
-    errors = []
-    for cuts in (1, 2):
-        state, dt = start(), 4.0 / cuts
-        for i in range(len(t) - 1):
-            way = (x[i + 1] - x[i]) / cuts
-            for j in range(cuts):
-                state = euler_step(
-                    state,
-                    t[i] + j * dt,
-                    dt,
-                    x[i] + j * way,
-                    x[i] + (j + 1) * way,
-                    heading=heading[i],
-                    basis=basis,
-                    params=COMPOSITE,
-                    reference=DAC,
-                )
-        errors.append(float(np.abs(state.xi - got.xi).max()))
-    assert errors[0] < 1e-5
-    assert errors[1] == pytest.approx(errors[0] / 2, rel=0.05)
-
-
-@pytest.mark.parametrize("spacing", [4.0, 60.0, 1800.0])
-@pytest.mark.parametrize("limit", [None, 0.25])
-def test_without_a_gain_or_a_reference_not_a_bit_changes(spacing, limit):
-    params = replace(TABLE_I, speed_gain=5e-6, max_speed=limit)
-    basis, track = params.basis(CENTRES), turning(spacing)
-    plain, said = advance(start(), *track, basis, params)
-    for gain, reference in ((0.0, DAC), (1 / 3600, None)):
-        other, too = advance(start(), *track, basis, replace(params, flow_gain=gain), reference)
-        for a, b in ((plain, other), (said, too)):
-            for field in fields(a):
-                assert np.array_equal(getattr(a, field.name), getattr(b, field.name))
-
-
-def test_a_reference_tells_speed_and_flow_apart_on_a_constant_heading():
-    params = AdaptiveParams(1e12, "exponential", omega=0.0, nu=0.0, k=0.003, gamma=5e-7, flow_gain=1 / 3600)
-    track, basis = steady(48.0, [0.3, 0.1], [1.0, 0.0]), params.basis([[0, 0]])
-    got, info = advance(init(0.1, 1), *track, basis, params, (0.05, 0.1))
-    assert got.speed == pytest.approx(0.25, abs=1e-4)
-    assert info.flow == pytest.approx([0.05, 0.1], abs=1e-4)
-
-
-def test_a_reference_tells_nothing_of_the_drift_at_the_surface():
-    basis, track = COMPOSITE.basis(CENTRES), steady(3.0, [0.2, -0.1], [0.0, 0.0])
-    plain, _ = advance(start(), *track, basis, COMPOSITE)
-    drawn, _ = advance(start(), *track, basis, COMPOSITE, DAC)
-    assert drawn.xi.tolist() == plain.xi.tolist()
-
-
-def test_functions_that_vanish_here_are_not_blown_up():
-    """cos(omega t + nu) passes 0: next to nothing of the flow can be told by weights then."""
-    params = replace(COMPOSITE, omega=2 * math.pi / 7200, nu=math.pi / 2)
-    got, _ = advance(start(), *turning(60.0), params.basis(CENTRES), params, (1.0, 1.0))
-    assert np.abs(got.xi).max() < 5.0
-
-
-def test_a_reference_must_be_finite():
-    with pytest.raises(ValueError, match="reference"):
-        advance(start(), *turning(60.0), COMPOSITE.basis(CENTRES), COMPOSITE, (math.nan, 0.0))
 
 
 def test_a_limit_out_of_reach_changes_nothing():
@@ -424,9 +337,7 @@ def test_weights_must_fit_the_basis():
         advance(init(0.3, 3), *turning(60.0), TABLE_I.basis(CENTRES), TABLE_I)
 
 
-@pytest.mark.parametrize(
-    "bad", [{"k": 0.0}, {"sigma": -1.0}, {"gamma": -1e-7}, {"speed_gain": -1e-7}, {"flow_gain": -1e-4}]
-)
+@pytest.mark.parametrize("bad", [{"k": 0.0}, {"sigma": -1.0}, {"gamma": -1e-7}, {"speed_gain": -1e-7}])
 def test_impossible_gains_are_refused(bad):
     with pytest.raises(ValueError, match="must"):
         replace(TABLE_I, **bad)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from announcing import HOUR, STEP, Talk, World, dive
-from gliderwatch.model import Expected, Severity
+from gliderwatch.model import Expected, Severity, Unusable
 from gliderwatch.rules.announce import NEWS, Said
 
 
@@ -221,7 +221,7 @@ class TestNotices:
     def test_not_for_a_dive_that_has_not_ended(self):
         talk, world = Talk(notices=True), World.of("00")
         talk.hear(world)
-        world.dives[2 * STEP] = dive(2, "-", reason="no fix")
+        world.dives[2 * STEP] = dive(2, "-", unusable=Unusable.NOT_SURFACED)
         assert talk.hear(world) == []
 
     def test_none_when_nobody_wants_them(self):

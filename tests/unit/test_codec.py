@@ -8,11 +8,11 @@ import msgspec
 import numpy as np
 import pytest
 
-from gliderwatch.errors import GliderwatchError
+from gliderwatch.errors import DamagedError, LayoutError, StateError
 from gliderwatch.model import Assessment, Incident, Segment
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, process
-from gliderwatch.store import codec
+from gliderwatch.store import codec, conversion
 from missions import Leg, mission
 
 LEGS = [Leg(speed=0.3 if k < 3 else 0.02, heading=0.7 * k, hours=3) for k in range(7)]
@@ -60,15 +60,59 @@ def test_between_any_two_steps_the_state_may_be_written_and_read():
         assert codec.encode(through) == codec.encode(straight)
 
 
-def test_a_newer_record_is_refused_with_a_way_out():
-    record = zlib.compress(msgspec.json.encode({"v": codec.VERSION + 1, "data": {}}))
-    with pytest.raises(GliderwatchError, match=r"version 2, this gliderwatch knows 1: install"):
-        codec.decode(record, GliderState)
+def record(version: int, data: object) -> bytes:
+    return zlib.compress(msgspec.json.encode({"v": version, "data": data}))
+
+
+@pytest.mark.parametrize("version", [0, conversion.version(GliderState) + 1])
+def test_a_record_of_no_layout_that_is_known_is_refused_with_a_way_out(version):
+    with pytest.raises(LayoutError, match=rf"layout {version}, this gliderwatch knows \d+: install"):
+        codec.decode(record(version, {}), GliderState)
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        b"",
+        b"\x00",
+        zlib.compress(b"{"),
+        zlib.compress(b'{"v": 1, "data": \xff}'),
+        codec.encode(GliderState())[:-9],
+    ],
+)
+def test_broken_bytes_are_damage(broken):
+    with pytest.raises(DamagedError, match="damaged"):
+        codec.decode(broken, GliderState)
+
+
+@pytest.mark.parametrize("text", ["", "{", b'{"threads": [\xff]}'])
+def test_a_row_whose_text_is_broken_is_damage(text):
+    with pytest.raises(DamagedError):
+        codec.plain_decode(text, Assessment)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [3, {"navigation": 3}, {"last": {"glider": "unit"}}, {"memory": {"estimate": {"joint": "none"}}}],
+)
+def test_whole_json_of_another_type_is_a_mistake_of_the_program_and_no_damage(data):
+    """A field that was renamed without a converter must not set a good state file aside."""
+    with pytest.raises(StateError, match=r"GliderState.*cannot read.*Nothing of it is lost") as raised:
+        codec.decode(record(conversion.version(GliderState), data), GliderState)
+    assert isinstance(raised.value, LayoutError) and not isinstance(raised.value, DamagedError)
+
+
+def test_an_array_that_is_none_is_no_damage():
+    segment = json.loads(zlib.decompress(codec.encode(mission(LEGS)[0])))["data"]
+    for array in ({}, 3, {"shape": [2], "f64": "!"}, {"shape": [5], "f64": ""}):
+        segment["quantities"] = {"depth": {"t": array, "v": array}}
+        with pytest.raises(LayoutError):
+            codec.decode(record(conversion.version(Segment), segment), Segment)
 
 
 def test_a_record_is_readable_with_standard_tools():
     read = json.loads(zlib.decompress(codec.encode(mission(LEGS)[0])))
-    assert read["v"] == codec.VERSION
+    assert read["v"] == conversion.version(Segment)
     depth = read["data"]["quantities"]["depth"]["v"]
     assert depth["shape"] == [len(mission(LEGS)[0].get("depth"))] and isinstance(depth["f64"], str)
 

@@ -141,7 +141,7 @@ gliders:
   plain:
   own:
     normal_speed: {max: 0.4}
-    estimator: composite
+    estimator: joint
     adaptive: {k: 0.005, speed_gain: null, centres: [[27, -83.5]]}
     rules: {anomaly: {clear_after: 5}, reminder_hours: null}
   other: {preset: fast, normal_speed: {min: 0.5}}
@@ -172,7 +172,7 @@ def test_precedence(write: Write, presets: Write) -> None:
     # < glider, key by key; null is a value
     assert (own.speed_min, own.speed_max) == (0.1, 0.4)
     assert (own.estimator, own.learner.k, own.learner.sigma, own.learner.gamma) == (
-        "composite",
+        "joint",
         0.005,
         2e3,
         1e-6,

@@ -15,7 +15,6 @@ from gliderwatch.currents.state import (
     Prediction,
     Score,
     choice,
-    displacement,
     forecasts,
     learn,
     predict,
@@ -79,7 +78,6 @@ def rms(dives: Dives, of: Callable[[Currents, float, float], np.ndarray], skip: 
 
 def test_before_any_dive_nothing_is_told():
     assert predict(Currents(), START, START + HOUR) is None
-    assert displacement(Currents(), START, START + HOUR) is None
 
 
 def test_after_one_dive_its_current_is_told_as_persistence():
@@ -119,15 +117,6 @@ def test_coverage(tide, memory):
             e = current - told.flow
             inside.append(e @ np.linalg.solve(told.cov + 0.006**2 * np.eye(2), e) < 5.991)
     assert 0.90 <= np.mean(inside) <= 0.985
-
-
-def test_the_displacement_is_the_mean_flow_times_the_time():
-    dives = wandering(60, seed=2, tide=0.3)
-    state = learnt(dives)
-    start, end = dives[-1][1] + 600, dives[-1][1] + 600 + 5 * HOUR
-    flow, moved = predict(state, start, end), displacement(state, start, end)
-    assert moved.x == pytest.approx(flow.flow * 5 * HOUR)
-    assert moved.cov == pytest.approx(flow.cov * (5 * HOUR) ** 2)
 
 
 def test_uncertainty_grows_into_the_future():

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gliderwatch.model import Dive, Segment, Series
+from gliderwatch.model import Dive, Segment, Series, Unusable
 from gliderwatch.navigation.dives import LONGEST, Navigation, extend
 from gliderwatch.navigation.samples import concatenated
 from gliderwatch.navigation.track import closure
@@ -63,8 +63,8 @@ class TestHealthy:
         _, dives = told(mission(LEGS, declination=declination))
         for dive in dives[:3]:
             out = closure(dive.track, dive.current)
-            assert out["along_speed"] == pytest.approx(0.3, abs=1e-3)
-            assert out["across_misfit"] == pytest.approx(0.0, abs=1e-3)
+            assert out.along_speed == pytest.approx(0.3, abs=1e-3)
+            assert out.across_misfit == pytest.approx(0.0, abs=1e-3)
 
     def test_the_dive_lies_between_its_fixes(self):
         _, dives = told(mission(LEGS))
@@ -106,6 +106,7 @@ class TestUnusable:
         s = mission(LEGS)[0]
         _, (dive,) = told([cut(s, START + 5000)])
         assert dive.end is None and dive.reason == "no fix" and dive.track is None
+        assert dive.unusable is Unusable.NOT_SURFACED
 
     def test_no_fix_before_the_dive_and_none_after(self):
         """What has not surfaced has not surfaced, whatever else is missing."""
@@ -121,11 +122,12 @@ class TestUnusable:
         }
         _, (dive,) = told([with_samples(s, **late)])
         assert dive.reason == "no fix before the dive" and dive.end is not None
+        assert dive.unusable is Unusable.NO_FIX_BEFORE
 
     def test_no_heading(self):
         _, (dive,) = told([with_samples(mission(LEGS)[0], heading=None)])
         assert dive.reason == "" and dive.n_samples == 0  # depth and pitch tell how fast it was
-        assert dive.evidence["heading_assumed"] == 1.0
+        assert dive.features.heading_assumed
 
     def test_turning_with_few_headings(self):
         s = with_samples(
@@ -133,7 +135,7 @@ class TestUnusable:
             heading=[(START + 200, 0.0), (START + 8000, 1.5), (START + 21000, 3.0)],
         )
         _, (dive,) = told([s])
-        assert dive.evidence["heading_assumed"] == 1.0
+        assert dive.features.heading_assumed
         assert any(note.startswith("headings missing") for note in dive.notes)
 
     def test_shorter_than_a_quarter_of_an_hour(self):
@@ -145,6 +147,7 @@ class TestUnusable:
         t = START + 180 + 7200 + 40
         _, (dive,) = told([fixes(s, (START + 30, 0.0), (START + 90, 0.0), (t, 900.0))])
         assert dive.reason.startswith("wild fix: ") and dive.track is None
+        assert dive.unusable is Unusable.WILD_FIX
 
     def test_days_without_a_fix_are_no_dive(self):
         legs = [Leg(hours=LONGEST / 3600 + 1)]
@@ -174,6 +177,7 @@ class TestUnusable:
         depth = concatenated(late.quantities, {"depth": series([(end + 60, 0.4)])})
         _, (dive,) = told([replace(late, quantities=depth, last_t=end + 9100)])
         assert dive.reason == "mostly surface drift"
+        assert dive.unusable is Unusable.SURFACE_DRIFT
 
 
 class TestDrift:
@@ -216,6 +220,7 @@ class TestOldFix:
         t = START + 180 + 7200 + 300
         state, (withdrawn,) = extend(state, fixes(segment("b", t - 10, {}), (t, 3.0), (t + 30, 3.01)))
         assert withdrawn.t_dive == dive.t_dive and withdrawn.reason == "stale fix"
+        assert withdrawn.unusable is Unusable.STALE_FIX
         assert withdrawn.track is None and withdrawn.current is None
         assert withdrawn.end.lat == pytest.approx(LAT + 3 * KM)  # where it really surfaced
         assert state.fix.t == t + 30
@@ -336,6 +341,7 @@ class TestHoles:
         a, b, _, d, e = self.halves()
         _, dives = told([a, b, d, e])
         assert dives[1].reason.startswith("data missing: 0.7 of 2.")
+        assert [x.unusable for x in dives] == [None, Unusable.DATA_MISSING, None]
         assert [x.reason for x in (dives[0], dives[2])] == ["", ""]
 
     def test_nothing_is_missing_when_it_is_there(self):

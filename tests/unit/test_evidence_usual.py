@@ -8,10 +8,11 @@ from alert_support import DISAGREE, SLOW
 from gliderwatch.alerts.evidence import how_sure, weigh
 from gliderwatch.alerts.usual import WORDINGS, usual
 from gliderwatch.estimation.baseline import QUANTITIES, Baseline, learn, told
-from gliderwatch.model import Assessment, Kind
+from gliderwatch.model import Assessment, DiveFeatures, Kind
+from gliderwatch.navigation.features import evidence
 
 HEALTHY = {
-    "duration_h": 3.0,
+    "duration": 3.0 * 3600,
     "roll_mean": 0.01,
     "pitch_dive": -0.45,
     "pitch_climb": 0.44,
@@ -29,9 +30,9 @@ def after(**changes: float) -> dict[str, float]:
     """The evidence of a dive after twelve healthy ones."""
     known = Baseline()
     for _ in range(12):
-        known = learn(known, HEALTHY)
-    dive = HEALTHY | changes
-    return {**dive, **told(known, dive)}
+        known = learn(known, DiveFeatures(**HEALTHY))
+    dive = DiveFeatures(**HEALTHY | changes)
+    return {**evidence(dive), **told(known, dive)}
 
 
 def slow(**changes: float) -> Assessment:
@@ -54,7 +55,7 @@ def test_each_number_of_the_baseline_has_words() -> None:
         ({"ballast_dive": -120e-6}, "pumps 120 cc to dive, usually 213 to 288: less"),
         ({"vacuum": 15e3}, "vacuum 15.0 kPa, usually 20.0 to 28.0: less"),
         ({"yos": 3.0}, "1.0 yos an hour, usually 1.4 to 2.6: fewer"),
-        ({"duration_h": 5.0}, "surfaced after 5.0 h, usually 1.8 to 4.2: later"),
+        ({"duration": 5.0 * 3600}, "surfaced after 5.0 h, usually 1.8 to 4.2: later"),
     ],
 )
 def test_out_of_the_usual_speaks_for_an_anomaly(changes: dict[str, float], words: str) -> None:
@@ -70,7 +71,7 @@ def test_out_of_the_usual_speaks_for_an_anomaly(changes: dict[str, float], words
         ({}, "roll 1 degrees, as usual (-4 to 5)"),
         ({}, "climbs at 0.16 m/s, as usual (0.14 to 0.18)"),
         ({"ballast_climb": 400e-6}, "pumps 400 cc to climb, usually 204 to 276: more"),
-        ({"duration_h": 1.2, "yos": 2.4}, "surfaced after 1.2 h, usually 1.8 to 4.2: earlier"),
+        ({"duration": 1.2 * 3600, "yos": 2.4}, "surfaced after 1.2 h, usually 1.8 to 4.2: earlier"),
         ({"yos": 12.0}, "4.0 yos an hour, usually 1.4 to 2.6: more"),
     ],
 )
@@ -100,26 +101,25 @@ def test_six_lines_on_each_side() -> None:
         depth_rate_dive=0.05,
         vacuum=1e4,
         yos=1.0,
-        duration_h=6.0,
-        speed_before=0.1,
-        across_misfit=0.01,
-        along_speed=0.1,
+        duration=6.0 * 3600,
     )
-    pro, con = weigh(odd, Kind.ANOMALY)
+    more = {"speed_before": 0.1, "across_misfit": 0.01, "along_speed": 0.1}
+    pro, con = weigh(replace(odd, evidence={**odd.evidence, **more}), Kind.ANOMALY)
     assert len(pro) == 6
     assert len(con) <= 6
     assert all(len(line) < 110 for line in (*pro, *con))
 
 
 def test_fixed_bounds_only_where_nothing_is_usual() -> None:
-    tilted = {"roll_mean": 0.38, "pitch_dive": -0.45, "pitch_climb": 0.72, "depth_rate_dive": 0.3}
-    tilted |= {"depth_rate_climb": -0.15, "duration_h": 3.0}
+    dive = DiveFeatures(3.0 * 3600, roll_mean=0.38, pitch_dive=-0.45, pitch_climb=0.72)
+    dive = replace(dive, depth_rate_dive=0.3, depth_rate_climb=-0.15)
+    tilted = evidence(dive)
     pro, _ = weigh(replace(SLOW, evidence=tilted, notes=()), Kind.ANOMALY)
     assert sum(line.startswith(("mean roll", "pitch differs", "dives at")) for line in pro) == 3
     known = Baseline()
     for _ in range(6):
-        known = learn(known, tilted)
-    pro, con = weigh(replace(SLOW, evidence={**tilted, **told(known, tilted)}, notes=()), Kind.ANOMALY)
+        known = learn(known, dive)
+    pro, con = weigh(replace(SLOW, evidence={**tilted, **told(known, dive)}, notes=()), Kind.ANOMALY)
     assert not any(line.startswith(("mean roll", "pitch", "dives at")) for line in pro)
     assert "roll 22 degrees, as usual (17 to 26)" in con
 

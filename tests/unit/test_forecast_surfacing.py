@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from gliderwatch.forecast.surfacing import Surfacings, expect, learn
-from gliderwatch.model import Expected, Fix
+from gliderwatch.model import Expected, Fix, Unusable
 from gliderwatch.navigation.frame import from_plane, to_plane
 from joint_support import DAY, HOUR, LAT, LON, START, Way, dive, mission
 
@@ -80,7 +80,7 @@ def test_hours_without_data_are_no_interval():
     late = replace(
         dives[5],
         end=replace(dives[5].end, t=dives[5].end.t + 6 * HOUR),
-        evidence={**dives[5].evidence, "unobserved_h": 6.0},
+        features=replace(dives[5].features, unobserved=6.0 * HOUR),
     )
     expected = expect(after([*dives[:5], late]), SPEED, SIGMA, steady())
     assert expected.after == late.end.t
@@ -188,7 +188,7 @@ def test_what_was_expected_after_another_surfacing_is_no_miss():
 def test_a_stale_fix_says_nothing_of_the_way():
     dives = mission([Way()] * 6)
     state = after(dives[:5])
-    stale = replace(dives[5], track=None, current=None, reason="stale fix")
+    stale = replace(dives[5], track=None, current=None, unusable=Unusable.STALE_FIX)
     seen = learn(state, stale, None, expect(state, SPEED, SIGMA, steady()))
     assert (seen.scores, seen.misses, seen.drift) == (state.scores, state.misses, state.drift)
     assert seen.fix == stale.end

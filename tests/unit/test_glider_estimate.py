@@ -37,7 +37,7 @@ def field(u: float, v: float, days: float = 4.0) -> Field:
     )
 
 
-@pytest.mark.parametrize("estimator", ["joint", "adaptive", "composite"])
+@pytest.mark.parametrize("estimator", ["joint", "adaptive"])
 def test_each_estimator_finds_a_healthy_glider_healthy(estimator):
     found = told(STRAIGHT, estimator=estimator)
     assert {a.flag for a in found[4:]} == {0}
@@ -102,7 +102,7 @@ def test_a_model_that_says_nothing_is_a_note_and_no_flag():
 
 
 @pytest.mark.parametrize("reference", ["tides", "learnt"])
-@pytest.mark.parametrize("estimator", ["joint", "adaptive", "composite"])
+@pytest.mark.parametrize("estimator", ["joint", "adaptive"])
 def test_a_forecast_as_the_reference(estimator, reference):
     found = told(STRAIGHT, estimator=estimator, reference=reference)
     assert found[0].reference_u is None and "no reference flow" in found[0].notes[-1]

@@ -56,7 +56,7 @@ def test_fewer_headings_and_turns_widen_the_uncertainty():
 
 def test_hours_without_data_widen_the_uncertainty():
     whole = dive(0, Way())
-    holed = replace(whole, evidence={**whole.evidence, "unobserved_h": 0.6})
+    holed = replace(whole, features=replace(whole.features, unobserved=0.6 * 3600))
     assert observe(holed).own_speed()[1] > 4 * observe(whole).own_speed()[1]
 
 

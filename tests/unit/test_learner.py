@@ -7,7 +7,7 @@ import pytest
 
 from gliderwatch.estimation.learner import Learner, step, warm_up
 from gliderwatch.estimation.observation import NEW_AFTER
-from gliderwatch.model import Assessment, Dive, Fix
+from gliderwatch.model import Assessment, Dive, DiveFeatures, Fix
 from gliderwatch.navigation.dives import Navigation, extend
 from gliderwatch.params import GliderParams, LearnerParams
 from missions import Leg, mission
@@ -77,7 +77,7 @@ def test_the_first_guess_is_what_the_first_dive_says():
 
 def test_without_a_current_the_first_guess_is_the_speed_on_board():
     first = replace(dives()[0], current=None)
-    _, (a,) = run([replace(first, evidence=dict(first.evidence) | {"onboard_speed": 0.32})])
+    _, (a,) = run([replace(first, features=replace(first.features, onboard_speed=0.32))])
     assert a.speed == pytest.approx(0.32, abs=0.05)
 
 
@@ -85,8 +85,9 @@ def test_without_a_current_the_first_guess_is_the_speed_on_board():
 def test_or_the_middle_of_the_range(absurd):
     first = replace(dives()[0], current=None)
     params = GliderParams(speed_min=0.25, speed_max=0.35, speed_learnt=False)
-    for evidence in ({}, {"onboard_speed": absurd}):
-        _, (a,) = run([replace(first, evidence=evidence)], params)
+    for onboard in (None, absurd):
+        features = DiveFeatures(duration=first.features.duration, onboard_speed=onboard)
+        _, (a,) = run([replace(first, features=features)], params)
         assert a.speed == pytest.approx(0.3, abs=0.06)
 
 

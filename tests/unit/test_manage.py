@@ -22,16 +22,18 @@ from gliderwatch.model import Kind, Severity
 from gliderwatch.params import Attention
 from gliderwatch.rules.acknowledged import acknowledge
 from gliderwatch.rules.announce import Said, Thread, as_told, due
+from gliderwatch.rules.muting import with_mute
 from gliderwatch.rules.waiting import QuietHours, Wait
 from gliderwatch.run import intake
 from gliderwatch.run.manage import mute
 from gliderwatch.run.manage.incidents import ack, incidents
-from gliderwatch.run.operator import failing
+from gliderwatch.run.posting import post_alerts
 from gliderwatch.run.speaking import NOBODY
 from gliderwatch.run.status import as_json, overview
 from gliderwatch.store import backup
 from gliderwatch.store.database import MEMORY
 from gliderwatch.store.sqlite import Store
+from gliderwatch.store.watch_health import failing
 
 NOW = 1_700_000_000.0
 
@@ -222,9 +224,9 @@ class TestMute:
         store = Store.open(MEMORY)
         if told is not None:
             store.notes.mute("electa", told, 0.0)
-        heeded = store.notes.heeded("electa", Attention(2.0, configured, True))
+        heeded = with_mute(Attention(2.0, configured, True), store.notes.muted_until("electa"))
         assert heeded == Attention(2.0, counts, True)
-        assert store.notes.heeded("other", Attention()) == Attention()
+        assert with_mute(Attention(), store.notes.muted_until("other")) == Attention()
 
     def test_puts_off_what_is_told_of_silence(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(intake.overdue, "next_tick", lambda *_: 100.0)
@@ -266,9 +268,9 @@ class TestWaiting:
         waits = {"mail": [Wait()], "sms": [Wait(after=1800.0)]}
         said = Said((Thread(incident().id, incident(), incident().last, 1, 0.0),))
         with closing(Store.open(Path(config.state.path))) as store:
-            store.say("electa", said, [alert()], lambda a: waits, NOW)
+            post_alerts(store, "electa", said, [alert()], lambda a: waits, NOW)
             notice = alert("n", incident="", audience=Severity.INFO)
-            store.say("electa", said, [notice], lambda a: {"post": [Wait(quiet=quiet)]}, NOW)
+            post_alerts(store, "electa", said, [notice], lambda a: {"post": [Wait(quiet=quiet)]}, NOW)
 
     def waiting(self, config: Config) -> list[tuple[str, str]]:
         with closing(Store.reading(Path(config.state.path))) as store:
@@ -287,7 +289,9 @@ class TestWaiting:
         ack(config, incident().id, "ann", "", NOW + 60)
         with closing(Store.open(Path(config.state.path))) as store:
             correction = [alert("a2", kind=Kind.CORRECTION)]
-            store.say("electa", store.said("electa"), correction, lambda a: {"sms": [Wait(after=1.0)]}, NOW)
+            post_alerts(
+                store, "electa", store.said("electa"), correction, lambda a: {"sms": [Wait(after=1.0)]}, NOW
+            )
         assert self.waiting(config) == [("a1", "mail"), ("n", "post")]
 
     def test_status_tells_what_is_held_and_that_it_is_no_trouble(
@@ -385,6 +389,8 @@ def test_a_state_of_an_earlier_release_is_read_but_not_written(config: Config, t
         db.executescript(
             "DROP TABLE mutes; DROP TABLE acks; DROP INDEX outbox_by_delivery; PRAGMA user_version = 2;"
             "ALTER TABLE outbox DROP COLUMN held_until; ALTER TABLE outbox DROP COLUMN escalates;"
+            "ALTER TABLE outbox DROP COLUMN delivery; ALTER TABLE files DROP COLUMN hindrance;"
+            "DROP INDEX files_by_segment;"
         )
     assert [u.held_until for u in overview(config).undelivered] == [0.0]
     assert failing(path, NOW) == {}

@@ -181,10 +181,22 @@ class TestOpened:
 class TestFalseAlarm:
     def test_says_that_the_reference_is_in_doubt(self) -> None:
         made = opened(DISAGREE, Kind.FALSE_ALARM)
-        assert made.title.startswith("FALSE ALARM electa: flow and reference disagree, 0.11 m/s")
+        assert made.title.startswith("MEASUREMENTS DISAGREE electa: do not trust its speed, 0.11 m/s")
         first = made.body.split("\n")[0]
         assert "disagree by 0.58 m/s (p_E 0.412, limit 0.300)" in first
         assert "cannot be trusted" in first
+
+    def test_no_word_for_people_sounds_like_ignore_me(self) -> None:
+        """The papers' word for flag 2 is not in what a pilot reads; the kind for machines keeps it."""
+        told = incident(DISAGREE, kind=Kind.FALSE_ALARM)
+        made = [
+            opened(DISAGREE, Kind.FALSE_ALARM),
+            message.reminder(told, DISAGREE, 24.0, alert_id="r", audience=Severity.WARNING),
+            message.all_clear(told, DISAGREE, alert_id="c", audience=Severity.WARNING),
+            message.surfacing(DISAGREE, None, alert_id="s"),
+        ]
+        assert made[0].kind == "false_alarm"
+        assert not [a for a in made if "false alarm" in f"{a.title} {a.body}".lower()]
 
     def test_the_same_evidence_changes_sides(self) -> None:
         body = opened(DISAGREE, Kind.FALSE_ALARM).body

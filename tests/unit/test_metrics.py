@@ -21,14 +21,15 @@ from ruamel.yaml import YAML
 from alert_support import SLOW, alert
 from gliderwatch.config import Config, load, service
 from gliderwatch.errors import ConfigError
-from gliderwatch.model import SegmentId, Severity
+from gliderwatch.model import Hindrance, SegmentId, Severity
 from gliderwatch.run import heartbeat
 from gliderwatch.run.heartbeat import DECODING, STALLED, Decoding, Heartbeat, Upkeep
 from gliderwatch.run.life import STALE
 from gliderwatch.run.metrics import Metrics, Outbox
-from gliderwatch.run.operator import HOUR, Failing, Operator, Vitals, channels, troubles
+from gliderwatch.run.operator import HOUR, Operator, Vitals, channels, troubles
 from gliderwatch.store import outbox
 from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.store.watch_health import Failing, Waiting
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 NOW = 1_800_000_000.0
@@ -239,7 +240,10 @@ def test_the_examples_can_be_read() -> None:
     ("vitals", "key"),
     [
         (Vitals(silent=24.1 * HOUR), "silence"),
-        (Vitals(quarantined=21), "quarantine"),
+        (Vitals(quarantined={"electa": 21, "sam": 20}), "quarantine/electa"),
+        (Vitals(quarantined={"": 21}), "quarantine"),
+        (Vitals(silent=0.0, missed={"electa": 24.1 * HOUR, "sam": 23.0 * HOUR}), "silence/electa"),
+        (Vitals(waiting={"electa": Waiting(3, NOW - 6.1 * HOUR, "no cache")}), "waiting/electa"),
         (Vitals(free=499.0), "disk"),
         (Vitals(failing={"mail": Failing(NOW - 1.1 * HOUR, 3, "421 later")}), "channel/mail"),
     ],
@@ -254,13 +258,14 @@ def test_each_trouble_is_told_beyond_its_limit_and_never_where_the_limit_is_null
 
 def test_within_the_limits_nothing_is_told() -> None:
     failing = {"mail": Failing(NOW - 0.9 * HOUR, 1, "")}
-    well = Vitals(silent=23.9 * HOUR, quarantined=20, free=501.0, failing=failing)
+    waiting = {"sam": Waiting(100, NOW - 5.9 * HOUR, "")}
+    well = Vitals(23.9 * HOUR, {"sam": 23.9 * HOUR}, {"sam": 20, "electa": 20}, waiting, failing, 501.0)
     assert troubles(well, LIMITS, (), NOW) == {}
     assert troubles(Vitals(), LIMITS, (), NOW) == {}
 
 
 def test_what_is_open_ends_only_well_within_its_limit() -> None:
-    near, far = Vitals(quarantined=15, free=550.0), Vitals(quarantined=10, free=600.0)
+    near, far = Vitals(quarantined={"": 15}, free=550.0), Vitals(quarantined={"": 10}, free=600.0)
     assert troubles(near, LIMITS, (), NOW) == {}
     assert set(troubles(near, LIMITS, ("quarantine", "disk"), NOW)) == {"quarantine", "disk"}
     assert troubles(far, LIMITS, ("quarantine", "disk"), NOW) == {}
@@ -277,13 +282,13 @@ def test_a_trouble_is_told_once_also_over_a_restart_and_so_is_its_end(state: Pat
     store.hear(segment("sam"), None, NOW)
     second = Operator(store, state, settings, NOW + 27 * HOUR, 0.0)
     assert second.look(settings, settings.operator, NOW + 27 * HOUR, 0.0) == (), "said before the restart"
-    second.came(10.0)
+    second.came("sam", 10.0)
     (over,) = second.look(settings, settings.operator, NOW + 27 * HOUR, 10.0)
     assert "files come again" in over.title
     assert over.severity is Severity.INFO
     assert (over.id, over.incident) == (told.id + "/over", told.incident)
     third = Operator(store, state, settings, NOW + 28 * HOUR, 0.0)
-    third.came(0.0)
+    third.came("sam", 0.0)
     assert third.look(settings, settings.operator, NOW + 28 * HOUR, 0.0) == ()
     assert [a.id for a in store.alerts()] == [told.id, over.id]
     assert len(store.undelivered()) == 4, "two messages by two channels"
@@ -310,7 +315,43 @@ def test_files_quarantined_within_a_day_count(state: Path, store: Store) -> None
     assert operator.look(settings, settings.operator, NOW, 0.0) == ()
     store.note(File("/more", 1, 1, Status.QUARANTINED), NOW)
     (told,) = operator.look(settings, settings.operator, NOW, 0.0)
-    assert "3 files quarantined in 24 h" in told.title
+    assert "3 files of no known glider quarantined in 24 h" in told.title
+
+
+def test_files_of_one_glider_that_wait_are_a_trouble_until_they_are_taken(state: Path, store: Store) -> None:
+    settings = config(state, operator={"free_mb": None})
+    operator = Operator(store, state, settings, NOW, 0.0)
+    lacks = File("/a", 1, 1, Status.WAITING, "sam", "s", "cache file ab.cac is missing: not in /c", "ab")
+    store.note(replace(lacks, hindrance=Hindrance.NO_CACHE), NOW)
+    store.note(replace(lacks, path="/b", hindrance=Hindrance.NO_CACHE), NOW + 5 * HOUR)
+    gone = replace(lacks, path="/c", glider="electa", crc="", hindrance=Hindrance.GONE)
+    store.note(gone, NOW)
+    operator.came("sam", 5 * HOUR)
+    assert operator.look(settings, settings.operator, NOW + 5.9 * HOUR, 5.9 * HOUR) == ()
+    (told,) = operator.look(settings, settings.operator, NOW + 6.1 * HOUR, 6.1 * HOUR)
+    assert told.title == "GLIDERWATCH: files of sam have waited for 6.1 h"
+    assert "2 wait; the oldest since" in told.body and "ab.cac is missing: not in /c" in told.body
+    for path in ("/a", "/b"):
+        store.note(File(path, 1, 1, Status.TAKEN, "sam", "s"), NOW + 7 * HOUR)
+    (over,) = operator.look(settings, settings.operator, NOW + 7 * HOUR, 7 * HOUR)
+    assert over.title == "GLIDERWATCH: no files of sam wait any more"
+
+
+def test_one_glider_is_missed_while_another_calls(state: Path, store: Store) -> None:
+    """Of its own limit, though files of the fleet come all the time; not in a mute."""
+    settings = config(state, operator={"free_mb": None})
+    for k in range(4):
+        store.hear(SegmentId(NOW + 3 * k * HOUR, "sam", f"s{k}"), None, NOW + 3 * k * HOUR)
+    operator = Operator(store, state, settings, NOW + 9 * HOUR, 9 * HOUR)
+    found = []
+    for hour in range(10, 40, 3):
+        operator.came("electa", hour * HOUR)
+        found += operator.look(settings, settings.operator, NOW + hour * HOUR, hour * HOUR)
+    (told,) = found
+    assert told.title == "GLIDERWATCH: no file of sam for 25.0 h"
+    operator.came("sam", 40 * HOUR)
+    (over,) = operator.look(settings, settings.operator, NOW + 40 * HOUR, 40 * HOUR)
+    assert over.title == "GLIDERWATCH: files of sam come again"
 
 
 def test_a_channel_that_fails_is_told_by_the_others_and_silences_the_heartbeat_with_the_last(

@@ -25,12 +25,6 @@ def test_kind_of_flight_data_in_either_case(name, kind):
     assert names.kind(name) == kind
 
 
-@pytest.mark.parametrize("name", ["a.tbd", "a.NBD", "a.ebd", "a.tcd", "a.ncd", "a.ECD"])
-def test_science_data_is_known(name):
-    assert names.is_science(name)
-    assert not names.is_science(name.replace(".", ".x"))
-
-
 @pytest.mark.parametrize("name", ["8bc72b32.cac", "8BC72B32.CAC", "8bc72b32.ccc", "8bc72b32.Ccc"])
 def test_cache_names(name):
     assert names.is_cache(name)

@@ -83,3 +83,41 @@ def test_impurity_is_seen(source: str) -> None:
 )
 def test_pure_text_is_left_alone(source: str) -> None:
     assert impurities(source) == []
+
+
+# ----------------------------------------------------------------------- SQL
+
+SQL = re.compile(
+    r"\s*(SELECT|INSERT (OR \w+ )?INTO|UPDATE \w+ SET|DELETE FROM|PRAGMA|CREATE|ALTER TABLE|BEGIN|COMMIT)\b"
+)
+
+
+def statements(source: str) -> list[str]:
+    """The SQL in a module's text: strings that begin as a statement does."""
+    nodes = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Constant)]
+    return [f"line {n.lineno}: {n.value}" for n in nodes if isinstance(n.value, str) and SQL.match(n.value)]
+
+
+def test_sql_is_in_the_store_alone() -> None:
+    root = ROOT / "src" / "gliderwatch"
+    found = {
+        str(path.relative_to(root)): lines
+        for path in sorted(root.rglob("*.py"))
+        if "store" not in path.relative_to(root).parts and (lines := statements(path.read_text("utf-8")))
+    }
+    assert found == {}
+
+
+@pytest.mark.parametrize(
+    ("source", "count"),
+    [
+        ("db.execute('SELECT 1')", 1),
+        ("f'SELECT {x} FROM y'", 1),
+        ("'INSERT OR IGNORE INTO a VALUES (1)'", 1),
+        ("'PRAGMA user_version'", 1),
+        ("'Select a file'", 0),
+        ("'updated'", 0),
+    ],
+)
+def test_sql_is_seen(source: str, count: int) -> None:
+    assert len(statements(source)) == count

@@ -3,7 +3,7 @@ import pytest
 
 from gliderwatch.estimation.causes import FASTEST
 from gliderwatch.estimation.range import Normal, RangeParams, learn, setting, speed_range
-from gliderwatch.model import readonly
+from gliderwatch.model import DiveFeatures, readonly
 
 PARAMS = RangeParams()
 
@@ -11,7 +11,7 @@ PARAMS = RangeParams()
 def learnt(speeds, at=0.0, normal=None, hours=3.0):
     normal = normal or Normal()
     for speed in speeds:
-        normal = learn(normal, speed, at, hours, PARAMS)
+        normal = learn(normal, speed, at, hours * 3600, PARAMS)
     return normal
 
 
@@ -49,7 +49,7 @@ def test_short_dives_count_when_the_trials_after_launch_are_over():
     """A coastal glider may surface every half hour for weeks."""
     normal = Normal()
     for before in range(12):
-        normal = learn(normal, 0.2 + 0.01 * before, 0.0, 0.5, PARAMS, before)
+        normal = learn(normal, 0.2 + 0.01 * before, 0.0, 1800.0, PARAMS, before)
     assert normal.speeds == pytest.approx([0.28, 0.29, 0.30, 0.31])
 
 
@@ -80,11 +80,11 @@ def test_drop_to_buoyancy_is_not_held_against_the_thruster():
 
 
 def test_setting_without_a_thruster():
-    assert setting({}) == 0.0
-    assert setting({"thruster": 0.4}) == 0.4
+    assert setting(DiveFeatures(duration=1.0)) == 0.0
+    assert setting(DiveFeatures(duration=1.0, thruster=0.4)) == 0.4
 
 
 def test_learning_does_not_change_its_input():
     normal = Normal(readonly([0.25]), readonly([0.0]))
-    learn(normal, 0.3, 0.0, 3.0, PARAMS)
+    learn(normal, 0.3, 0.0, 10800.0, PARAMS)
     assert len(normal.speeds) == 1

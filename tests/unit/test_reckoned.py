@@ -9,33 +9,38 @@ import pytest
 from gliderwatch.estimation.causes import Cause
 from gliderwatch.estimation.reckoned import FEW, KEPT, Ratios, Reckoned, learn, reckon, vertical
 from gliderwatch.estimation.speed import SpeedParams, SpeedState, step
-from gliderwatch.model import Flag, readonly
-from joint_support import Way, mission, ways
+from gliderwatch.model import DiveFeatures, Flag, readonly
+from joint_support import HOUR, Way, mission, ways
 
 PARAMS, NOTHING = SpeedParams(), SpeedState()
 PITCH = 0.45
 CIRCLE = tuple(np.linspace(0, 2 * math.pi, 24, endpoint=False))
 
 
+def telling_dive(*args, **more):
+    """The features of a dive that tells its speed, as `told`."""
+    return DiveFeatures(**told(*args, **more))
+
+
 def told(speed, ratio=1.17, pitch=PITCH, onboard=None):
     """What a glider tells that flies at a speed W (m/s). Its depth rate is a ratio too high, as on real ones;
     or it tells its mean speed ``onboard`` alone."""
     if onboard is not None:
-        return {"onboard_speed": onboard, "duration_h": 3.0}
+        return {"onboard_speed": onboard, "duration": 3 * HOUR}
     rate = ratio * speed * math.tan(pitch)
     return {
         "depth_rate_dive": rate,
         "pitch_dive": -pitch,
         "depth_rate_climb": -rate,
         "pitch_climb": pitch,
-        "duration_h": 3.0,
+        "duration": 3 * HOUR,
     }
 
 
 def telling(dives, speeds, **more):
     """Dives that tell their speeds (m/s) too; None: no word of it."""
     return [
-        dive if speed is None else replace(dive, evidence={**dive.evidence, **told(speed, **more)})
+        dive if speed is None else replace(dive, features=replace(dive.features, **told(speed, **more)))
         for dive, speed in zip(dives, speeds, strict=True)
     ]
 
@@ -63,13 +68,13 @@ def blinded(dive):
 
 
 def test_vertical_speed_is_depth_rate_over_tangent():
-    assert vertical(told(0.25, ratio=1.0)) == pytest.approx(0.25)
+    assert vertical(telling_dive(0.25, ratio=1.0)) == pytest.approx(0.25)
 
 
 def test_ways_down_and_up_count_by_the_time_that_they_take():
     """100 m down in 500 s and up in 1000 s, at 0.4 rad: twice 100 m / tan 0.4 in 1500 s."""
     found = vertical(
-        {"depth_rate_dive": 0.2, "pitch_dive": -0.4, "depth_rate_climb": -0.1, "pitch_climb": 0.4}
+        DiveFeatures(1500.0, depth_rate_dive=0.2, pitch_dive=-0.4, depth_rate_climb=-0.1, pitch_climb=0.4)
     )
     assert found == pytest.approx(2 * 100 / math.tan(0.4) / 1500)
 
@@ -84,27 +89,27 @@ def test_ways_down_and_up_count_by_the_time_that_they_take():
     ],
 )
 def test_no_vertical_speed_where_a_part_of_it_is_missing(change):
-    evidence = {k: v for k, v in {**told(0.25), **change}.items() if v is not None}
-    assert vertical(evidence) is None
-    assert reckon(Ratios(), evidence) is None
+    features = DiveFeatures(**{**told(0.25), **change})
+    assert vertical(features) is None
+    assert reckon(Ratios(), features) is None
 
 
 def test_ratio_is_a_guess_until_three_dives_tell():
-    known, evidence = Ratios(), told(0.25, ratio=1.3)
+    known, features = Ratios(), DiveFeatures(**told(0.25, ratio=1.3))
     for k in range(FEW):
-        found = reckon(known, evidence)
+        found = reckon(known, features)
         assert found.speed == pytest.approx(0.25 * 1.3 / 1.17), k
         assert found.sigma == pytest.approx(0.15 * found.speed)
-        known = learn(known, evidence, 0.25)
-    found = reckon(known, evidence)
+        known = learn(known, features, 0.25)
+    found = reckon(known, features)
     assert found == Reckoned(pytest.approx(0.25), pytest.approx(0.07 * 0.25), 0.01, is_prompt=True)
 
 
 def test_scatter_of_the_ratios_is_their_uncertainty():
     known = Ratios()
     for ratio in (0.9, 1.0, 1.1, 1.3, 1.2):
-        known = learn(known, told(0.25, ratio=ratio), 0.25)
-    found = reckon(known, told(0.25, ratio=1.1))
+        known = learn(known, telling_dive(0.25, ratio=ratio), 0.25)
+    found = reckon(known, telling_dive(0.25, ratio=1.1))
     assert found.speed == pytest.approx(0.25)
     assert found.sigma == pytest.approx(1.4826 * 0.1 * 0.25, rel=0.1)
 
@@ -112,36 +117,38 @@ def test_scatter_of_the_ratios_is_their_uncertainty():
 def test_only_the_last_dives_count():
     known = Ratios()
     for k in range(2 * KEPT):
-        known = learn(known, told(0.25, ratio=1.0 if k < KEPT else 1.3), 0.25)
+        known = learn(known, telling_dive(0.25, ratio=1.0 if k < KEPT else 1.3), 0.25)
     assert len(known.vertical) == KEPT
-    assert reckon(known, told(0.25, ratio=1.3)).speed == pytest.approx(0.25)
+    assert reckon(known, telling_dive(0.25, ratio=1.3)).speed == pytest.approx(0.25)
 
 
 def test_mean_of_the_glider_is_not_used_before_three_healthy_dives():
-    known, evidence = Ratios(), told(0.0, onboard=0.26)
+    known, features = Ratios(), DiveFeatures(**told(0.0, onboard=0.26))
     for _ in range(FEW):
-        assert reckon(known, evidence) is None
-        known = learn(known, evidence, 0.25)
-    found = reckon(known, evidence)
+        assert reckon(known, features) is None
+        known = learn(known, features, 0.25)
+    found = reckon(known, features)
     assert found == Reckoned(pytest.approx(0.25), pytest.approx(0.12 * 0.25), 0.1, is_prompt=False)
 
 
 def test_vertical_speed_comes_first():
     known = Ratios((1.0,) * FEW, (1.0,) * FEW)
-    assert reckon(known, {**told(0.25, ratio=1.0), "onboard_speed": 0.4}).speed == pytest.approx(0.25)
-    assert reckon(known, told(0.0, onboard=0.4)).speed == pytest.approx(0.4)
+    assert reckon(known, replace(telling_dive(0.25, ratio=1.0), onboard_speed=0.4)).speed == pytest.approx(
+        0.25
+    )
+    assert reckon(known, telling_dive(0.0, onboard=0.4)).speed == pytest.approx(0.4)
 
 
 @pytest.mark.parametrize("speed", [0.0, -0.2])
 def test_speed_that_cannot_be_tells_nothing_and_teaches_nothing(speed):
-    evidence = told(0.0, onboard=speed)
-    assert reckon(Ratios(onboard=(1.0,) * FEW), evidence) is None
-    assert learn(Ratios(), evidence, 0.25) == Ratios()
+    features = DiveFeatures(**told(0.0, onboard=speed))
+    assert reckon(Ratios(onboard=(1.0,) * FEW), features) is None
+    assert learn(Ratios(), features, 0.25) == Ratios()
 
 
 def test_short_dive_tells_nothing_and_teaches_nothing():
     """Its turns and the surface take too much of the time."""
-    short = {**told(0.25), "duration_h": 0.9}
+    short = replace(telling_dive(0.25), duration=0.9 * HOUR)
     assert reckon(Ratios(), short) is None
     assert learn(Ratios(), short, 0.25) == Ratios()
 
@@ -221,7 +228,7 @@ def after_healthy(**more):
 
 def test_dive_without_heading_is_flag_1_by_its_vertical_speed():
     state, dive = after_healthy()
-    slow = replace(dive, evidence={**dive.evidence, **told(0.125)})
+    slow = replace(dive, features=replace(dive.features, **told(0.125)))
     after, verdict = step(state, slow, PARAMS)
     assert verdict.flag is Flag.ANOMALY
     assert verdict.reason == "slower than normal by depth rate and pitch alone (no heading for 2.9 h)"
@@ -232,14 +239,14 @@ def test_dive_without_heading_is_not_flagged_where_its_vertical_speed_is_as_usua
     state, dive = after_healthy()
     verdict = step(state, dive, PARAMS)[1]
     assert (verdict.flag, verdict.reason) == (None, "no heading for 2.9 h")
-    a_little_slow = replace(dive, evidence={**dive.evidence, **told(0.19)})
+    a_little_slow = replace(dive, features=replace(dive.features, **told(0.19)))
     assert step(state, a_little_slow, PARAMS)[1].flag is None
 
 
 def test_dive_without_heading_is_not_flagged_by_a_mean_that_lags():
     state, dive = after_healthy(onboard=0.26)
     assert len(state.ratios.onboard) == 8
-    slow = replace(dive, evidence={**dive.evidence, "onboard_speed": 0.1})
+    slow = replace(dive, features=replace(dive.features, onboard_speed=0.1))
     assert step(state, slow, PARAMS)[1].flag is None
 
 

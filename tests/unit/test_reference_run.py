@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from euler import euler_step
 from gliderwatch.detection.flags import FlowMaxima, flag, p_e, update
-from gliderwatch.estimation.adaptive import AdaptiveParams, AdaptiveState, advance, euler_step, init
+from gliderwatch.estimation.adaptive import AdaptiveParams, AdaptiveState, advance, init
 from gliderwatch.estimation.basis import Basis, phi
 from gliderwatch.model import Flag, readonly
 

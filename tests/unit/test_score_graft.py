@@ -33,24 +33,24 @@ def slowed(size):
 
 def test_a_slowed_glider_is_slower_and_its_current_still_right():
     found = closures(slowed(0.4))
-    speeds = [c["along_speed"] for c in found]
+    speeds = [c.along_speed for c in found]
     assert speeds[:4] == pytest.approx([0.3] * 4, rel=0.02)
     assert speeds[4:] == pytest.approx([0.18] * len(speeds[4:]), rel=0.02)
-    assert max(abs(c["across_misfit"]) for c in found[:-1]) < 0.005  # the last current is provisional
+    assert max(abs(c.across_misfit) for c in found[:-1]) < 0.005  # the last current is provisional
 
 
 def test_a_slowed_glider_sinks_slower_too():
     dives = navigate(slowed(0.4))
-    assert dives[0].evidence["depth_max"] == pytest.approx(205.0)
-    assert dives[-1].evidence["depth_max"] == pytest.approx(5 + 0.6 * 200.0)
+    assert dives[0].features.depth_max == pytest.approx(205.0)
+    assert dives[-1].features.depth_max == pytest.approx(5 + 0.6 * 200.0)
 
 
 def test_a_wrong_current_is_across_and_the_way_as_it_was():
     plain, wrong = mission(LEGS), grafted(mission(LEGS), Graft(GraftKind.DAC_WRONG, 0.2), ONSET, 0.3)
     found = closures(wrong)
-    assert [c["across_misfit"] for c in found[:4]] == pytest.approx([0.0] * 4, abs=0.005)
-    assert [c["across_misfit"] for c in found[4:-1]] == pytest.approx([-0.2] * 3, abs=0.005)
-    assert [c["along_speed"] for c in found] == pytest.approx([0.3] * len(found), rel=0.02)
+    assert [c.across_misfit for c in found[:4]] == pytest.approx([0.0] * 4, abs=0.005)
+    assert [c.across_misfit for c in found[4:-1]] == pytest.approx([-0.2] * 3, abs=0.005)
+    assert [c.along_speed for c in found] == pytest.approx([0.3] * len(found), rel=0.02)
     for a, b in zip(navigate(plain), navigate(wrong), strict=True):
         assert np.array_equal(a.track.x, b.track.x)
 

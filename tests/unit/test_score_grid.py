@@ -63,7 +63,7 @@ def test_no_such_grid():
 
 def test_an_unknown_estimator_is_refused_with_the_known_ones():
     assert check("adaptive:franklin") in known()
-    names = "joint, composite, adaptive, adaptive:franklin"
+    names = "joint, adaptive, adaptive:franklin"
     with pytest.raises(GliderwatchError, match=f"no estimator adaptve; known are: {names}"):
         check("adaptve")
 

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from gliderwatch.model import Current, Fix, Track
+from gliderwatch.navigation.features import evidence, track_features
 from gliderwatch.navigation.flight import Flight
 from gliderwatch.navigation.frame import from_plane, to_plane
-from gliderwatch.navigation.track import build_track, closure, evidence, mean_heading
+from gliderwatch.navigation.track import build_track, closure, mean_heading
 from missions import LAT, LON, series
 
 H = 3600.0
@@ -118,27 +119,27 @@ def closing(course: float, compass: float, speed: float = SPEED, current=CURRENT
 @pytest.mark.parametrize("course", range(0, 360, 30))
 def test_the_triangle_closes(course):
     out = closing(course, course)
-    assert out["along_speed"] == pytest.approx(SPEED, abs=1e-3)
-    assert out["across_misfit"] == pytest.approx(0.0, abs=1e-4)
-    assert out["across_sigma"] == pytest.approx(0.0, abs=1e-4)
+    assert out.along_speed == pytest.approx(SPEED, abs=1e-3)
+    assert out.across_misfit == pytest.approx(0.0, abs=1e-4)
+    assert out.across_sigma == pytest.approx(0.0, abs=1e-4)
 
 
 def test_a_slow_glider_shows_along_and_not_across():
     out = closing(60, 60, speed=0.1)
-    assert out["along_speed"] == pytest.approx(0.1, abs=1e-3)
-    assert abs(out["across_misfit"]) < 1e-4
+    assert out.along_speed == pytest.approx(0.1, abs=1e-3)
+    assert abs(out.across_misfit) < 1e-4
 
 
 def test_a_wrong_compass_shows_across():
     out = closing(60, 76.3)
-    assert abs(out["across_misfit"]) == pytest.approx(SPEED * np.sin(np.radians(16.3)), rel=0.1)
+    assert abs(out.across_misfit) == pytest.approx(SPEED * np.sin(np.radians(16.3)), rel=0.1)
 
 
 def test_a_wrong_current_shows_across_unless_it_lies_along():
     aside = closing(0, 0, current=(CURRENT[0] + 0.2, CURRENT[1]))
-    assert aside["across_misfit"] == pytest.approx(0.2, rel=0.01)  # counter-clockwise positive
+    assert aside.across_misfit == pytest.approx(0.2, rel=0.01)  # counter-clockwise positive
     along = closing(0, 0, current=(CURRENT[0], CURRENT[1] + 0.2))
-    assert along["along_speed"] == pytest.approx(SPEED - 0.2 * (2 * H + 600) / (2 * H), rel=0.02)
+    assert along.along_speed == pytest.approx(SPEED - 0.2 * (2 * H + 600) / (2 * H), rel=0.02)
 
 
 def test_few_scattered_headings_leave_the_misfit_open():
@@ -148,15 +149,15 @@ def test_few_scattered_headings_leave_the_misfit_open():
         scattered = heading(*[(t, rng.normal(90, 20)) for t in np.arange(300, 7501, 720.0)])
         track = build_track(scattered, FLIGHT, START, end_at(SPEED * 2 * H, 0.0))
         out = closure(track, Current(0.0, 0.0, True))
-        sigmas.append(out["across_sigma"])
-        misfits.append(out["across_misfit"])
+        sigmas.append(out.across_sigma)
+        misfits.append(out.across_misfit)
     assert np.median(sigmas) == pytest.approx(np.std(misfits), rel=0.3)
 
 
 def test_a_circling_glider_has_no_direction():
     circles = heading(*[(t, 360.0 * k / 8) for k, t in enumerate(np.arange(300, 7501, 450.0))])
     track = build_track(circles, FLIGHT, START, end_at(300.0, 0.0))
-    assert closure(track, Current(0.0, 0.0, True)) == {}
+    assert closure(track, Current(0.0, 0.0, True)) is None
 
 
 def test_evidence_of_a_dive():
@@ -170,24 +171,26 @@ def test_evidence_of_a_dive():
         "speed_onboard": series([(t, 0.33) for t in times]),
     }
     samples = steady(60.0) | extra
-    out = evidence(samples, FLIGHT, build_track(samples, FLIGHT, START, end_at(2000.0, 0.0)))
-    assert out["duration_h"] == pytest.approx(2.0) and out["drift_h"] == pytest.approx(600 / 3600)
-    assert out["ground_speed"] == pytest.approx(2000 / (2 * H + 600), rel=1e-3)
-    assert out["heading_mean"] == pytest.approx(60.0) and out["heading_steadiness"] == pytest.approx(1.0)
-    assert out["depth_max"] == pytest.approx(365.0, abs=7)
-    assert (out["pitch_dive"], out["pitch_climb"]) == pytest.approx((-0.4, 0.5))
-    assert (out["roll_mean"], out["roll_std"]) == pytest.approx((0.1, 0.0))
-    assert (out["depth_rate_dive"], out["depth_rate_climb"]) == pytest.approx((0.1, -0.1))
-    assert out["onboard_speed"] == pytest.approx(0.33)
-    assert np.isfinite(list(out.values())).all()
+    out = track_features(samples, FLIGHT, build_track(samples, FLIGHT, START, end_at(2000.0, 0.0)))
+    assert out.duration == pytest.approx(2 * H) and out.drift == pytest.approx(600)
+    assert out.ground_speed == pytest.approx(2000 / (2 * H + 600), rel=1e-3)
+    assert out.heading_mean == pytest.approx(np.radians(60.0)) and out.heading_steadiness == pytest.approx(
+        1.0
+    )
+    assert out.depth_max == pytest.approx(365.0, abs=7)
+    assert (out.pitch_dive, out.pitch_climb) == pytest.approx((-0.4, 0.5))
+    assert (out.roll_mean, out.roll_std) == pytest.approx((0.1, 0.0))
+    assert (out.depth_rate_dive, out.depth_rate_climb) == pytest.approx((0.1, -0.1))
+    assert out.onboard_speed == pytest.approx(0.33)
+    assert np.isfinite(list(evidence(out).values())).all()
 
 
 def test_depth_near_the_surface_alone_is_no_depth_of_the_dive():
     samples = steady(60.0) | {
         "depth": series([(310, 4.0), (340, 6.0), (7400, 5.0), (7430, 3.5), (7460, 1.0)])
     }
-    out = evidence(samples, FLIGHT, build_track(samples, FLIGHT, START, end_at(2000.0, 0.0)))
-    assert "depth_max" not in out
+    out = track_features(samples, FLIGHT, build_track(samples, FLIGHT, START, end_at(2000.0, 0.0)))
+    assert out.depth_max is None
 
 
 def test_mean_heading_counts_the_surface_as_nothing():

@@ -12,7 +12,8 @@ import threading
 from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
-from gliderwatch.alerts.smtp import PARTLY, DeliveryError, envelope_of, first, is_permanent, reach, submit
+from gliderwatch.alerts.mailto import MailServer, mail_server
+from gliderwatch.alerts.smtp import DeliveryError, first, is_permanent, reach, submit
 from gliderwatch.model import Alert, Kind, Severity
 
 __all__ = ["Channel", "DeliveryError", "problem", "scrub"]
@@ -45,6 +46,7 @@ class Channel:
         self.name = name
         self._url = url
         self._service: Any = None
+        self._mail: MailServer | None = None
         self._accepted: dict[str, set[str]] = {}
         self._refused: dict[str, dict[str, tuple[int, bytes]]] = {}
 
@@ -58,6 +60,7 @@ class Channel:
         """
         if self._service is None:
             self._service, _ = _service(self._url)
+            self._mail = mail_server(self._service)
 
     def reach(self) -> bool:
         """Whether the server of a mail channel answers and lets us in; nothing is sent.
@@ -65,10 +68,10 @@ class Channel:
         False of other services: there is no asking without a message. Raises DeliveryError.
         """
         self.prepare()
-        if not _is_mail(self._service):
+        if self._mail is None:
             return False
         try:
-            reach(self._service)
+            reach(self._mail)
         except DeliveryError as error:
             raise DeliveryError(scrub(str(error), self._url)) from None
         return True
@@ -77,22 +80,22 @@ class Channel:
         """Deliver one alert; raises DeliveryError unless it surely was."""
         self.prepare()
         try:
-            if _is_mail(self._service):
-                self._send_mail(alert)
+            if self._mail is not None:
+                self._send_mail(self._mail, alert)
             else:
                 _notify(self._service, alert)
         except DeliveryError as error:
             raise DeliveryError(scrub(str(error), self._url), permanent=error.permanent) from None
 
-    def _send_mail(self, alert: Alert) -> None:
+    def _send_mail(self, server: MailServer, alert: Alert) -> None:
         """Deliver to every recipient; those who took or refused it for good are not asked again."""
-        envelope = envelope_of(self._service)
-        if not envelope.recipients:
+        recipients = server.envelope.recipients
+        if not recipients:
             raise DeliveryError("the URL names no valid address to send to")
         refused = self._refused.setdefault(alert.id, {})
         done = self._accepted.setdefault(alert.id, set())
-        rest = [address for address in envelope.recipients if address not in done | set(refused)]
-        answers = submit(self._service, alert, envelope, rest) if rest else {}
+        rest = [address for address in recipients if address not in done | set(refused)]
+        answers = submit(server, alert, rest) if rest else {}
         later = {address: answer for address, answer in answers.items() if not is_permanent(answer[0])}
         done.update(set(rest) - set(answers))
         refused.update({address: answer for address, answer in answers.items() if address not in later})
@@ -102,11 +105,13 @@ class Channel:
             )
         del self._accepted[alert.id], self._refused[alert.id]
         if refused:
-            n = len(envelope.recipients)
-            partly = PARTLY if len(refused) < n else ""
+            n = len(recipients)
+            partly = len(refused) < n
+            some = "only some took it: " if partly else ""
             raise DeliveryError(
-                f"{partly}mail server refused {len(refused)} of {n} recipients: {first(refused)}",
+                f"{some}mail server refused {len(refused)} of {n} recipients: {first(refused)}",
                 permanent=True,
+                partly=partly,
             )
 
 
@@ -119,13 +124,14 @@ def problem(url: str) -> str | None:
         service, warnings = _service(url)
     except DeliveryError as error:
         return str(error)
-    dropped = _dropped(service, url) if _is_mail(service) else []
+    mail = mail_server(service)
+    dropped = _dropped(mail, url) if mail is not None else []
     return "; ".join([*warnings, *dropped]) or None
 
 
-def _dropped(service: Any, url: str) -> list[str]:
+def _dropped(mail: MailServer, url: str) -> list[str]:
     """What stands for an address in the URL of a mail channel but is none: Apprise leaves it out silently."""
-    taken = [address.lower() for address in envelope_of(service).recipients]
+    taken = [address.lower() for address in mail.envelope.recipients]
     given = parse_qs(url.partition("?")[2])
     parts = [
         part.strip()
@@ -215,12 +221,6 @@ def _quiet() -> logging.Logger:
         logger.setLevel(logging.WARNING)
         logger.propagate = False
     return logging.getLogger("apprise")
-
-
-def _is_mail(service: Any) -> bool:
-    from apprise.plugins.email import NotifyEmail  # noqa: PLC0415
-
-    return type(service) is NotifyEmail and service.pgp_mode == "no"
 
 
 def _notify(service: Any, alert: Alert) -> None:

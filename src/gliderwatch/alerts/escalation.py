@@ -11,8 +11,9 @@ from gliderwatch.model import Alert, Kind
 
 def escalated(alert: Alert, waited: float) -> Alert:
     """The message, for who is told it after so long (s) without an acknowledgement."""
-    silence = alert.incident.startswith(f"{alert.glider}/{Kind.OVERDUE}/")
-    command = f"mute {alert.glider} --hours 6" if silence else f"ack {alert.incident.rstrip('+')}"
+    muted = tuple(f"{alert.glider}/{kind}/" for kind in (Kind.OVERDUE, Kind.UNKNOWN))
+    is_muted = alert.incident.startswith(muted)  # there is no incident to acknowledge
+    command = f"mute {alert.glider} --hours 6" if is_muted else f"ack {alert.incident.rstrip('+')}"
     lead = f"Nobody has acknowledged this for {duration(waited)}: that is why you are told. "
     lead += f"If you take it on: gliderwatch {clean(command)}"
     return replace(

@@ -2,8 +2,7 @@
 
 Apprise makes its own text part out of the HTML and always adds a Message-ID of its own, so that
 a thread cannot be built with it (a second Message-ID is refused by large providers). The mail is
-therefore composed here and sent by `channels`, with the server and people that Apprise read from
-the URL.
+therefore composed here and sent by `smtp`, with the server and people that `mailto` reads.
 """
 
 from __future__ import annotations

@@ -9,10 +9,21 @@ from __future__ import annotations
 
 from gliderwatch.alerts.evidence import checks, difference, how_sure, out_of_range, weigh
 from gliderwatch.alerts.page import Page
-from gliderwatch.alerts.words import UNKNOWN, clean, duration, flow, known, map_link, place, speed, utc
+from gliderwatch.alerts.words import (
+    INCIDENTS,
+    UNKNOWN,
+    clean,
+    duration,
+    flow,
+    known,
+    map_link,
+    place,
+    speed,
+    utc,
+)
 from gliderwatch.model import Alert, Assessment, Expected, Flag, Incident, Kind, Severity
 
-NAMES = {Kind.ANOMALY: "anomaly", Kind.FALSE_ALARM: "false alarm"}
+TITLES = {Kind.ANOMALY: "ANOMALY", Kind.FALSE_ALARM: "MEASUREMENTS DISAGREE"}
 
 
 def opened(incident: Incident, assessment: Assessment, *, alert_id: str, audience: Severity) -> Alert:
@@ -22,8 +33,8 @@ def opened(incident: Incident, assessment: Assessment, *, alert_id: str, audienc
         (_since(incident), *_facts(assessment, incident.dives)),
         (*_weighed(incident.kind, assessment), ("Check", checks(incident, assessment))),
     )
-    disagree = "flow and reference disagree, " if incident.kind is Kind.FALSE_ALARM else ""
-    title = f"{_name(incident).upper()} {_glider(incident)}: {disagree}{_against_range(assessment)}"
+    doubt = "do not trust its speed, " if incident.kind is Kind.FALSE_ALARM else ""
+    title = f"{TITLES[incident.kind]} {_glider(incident)}: {doubt}{_against_range(assessment)}"
     return _alert(
         incident,
         assessment.t_surface,
@@ -190,7 +201,7 @@ def flag_words(assessment: Assessment, *, short: bool = False) -> str:
     words = {
         Flag.NORMAL: ("normal", ""),
         Flag.ANOMALY: ("anomaly", "speed out of its normal range"),
-        Flag.FALSE_ALARM: ("false alarm", "flow and reference disagree"),
+        Flag.FALSE_ALARM: ("measurements disagree", "flow and reference disagree"),
     }[Flag(assessment.flag)]
     if short or assessment.flag == Flag.NORMAL:
         return words[0]
@@ -224,7 +235,7 @@ def _alert(
 
 
 def _name(incident: Incident) -> str:
-    return NAMES.get(incident.kind, str(incident.kind))
+    return INCIDENTS[incident.kind]
 
 
 def _glider(about: Incident | Assessment) -> str:

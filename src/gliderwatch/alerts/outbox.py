@@ -13,16 +13,18 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from typing import Protocol
 from zlib import crc32
 
 import structlog
 
 from gliderwatch.alerts import message
-from gliderwatch.alerts.worker import OutboxRow, Result, Sender, Worker
+from gliderwatch.alerts.escalation import escalated
+from gliderwatch.alerts.worker import Delivery, OutboxRow, Result, Sender, Worker
 from gliderwatch.model import Alert, Severity
 
-__all__ = ["Dispatcher", "OutboxRow", "OutboxStore", "Sender", "retry_delay"]
+__all__ = ["Delivery", "Dispatcher", "OutboxRow", "OutboxStore", "Sender", "retry_delay"]
 
 log = structlog.get_logger(__name__)
 
@@ -59,9 +61,15 @@ class OutboxStore(Protocol):
         ...
 
     def refused(
-        self, row_id: int, error: str, now: float, report: Alert | None, channels: Iterable[str]
+        self,
+        row_id: int,
+        delivery: Delivery,
+        error: str,
+        now: float,
+        report: Alert | None,
+        channels: Iterable[str],
     ) -> None:
-        """Give a row up, keep its reason, post `report` to other channels, and commit both as one."""
+        """Give a row up, keep how and why, post `report` to other channels, and commit both as one."""
         ...
 
     def park(self, row_id: int, error: str) -> None:
@@ -188,19 +196,19 @@ class Dispatcher:
                 log.warning("alert parked", **_about(row), reason=error)
             elif worker.row is None:
                 self._waiting.pop(row.id, None)
-                worker.give(row)
+                worker.give(_with_reason(row))
         # a row that is due but waits for its worker needs no alarm clock: the worker's report wakes us
         return min([HEARTBEAT, self._limit, *(t - now for t in self._waiting.values() if t > now)])
 
     def _note(self, store: OutboxStore, result: Result) -> None:
         row, worker = result.row, result.worker
-        if result.error is None:
+        if result.delivery is Delivery.DELIVERED:
             store.delivered(row.id, self._clock())
             self._waiting.pop(row.id, None)
             seconds = round(result.seconds, 3)
             log.info("alert delivered", **_about(row), seconds=seconds)
-        elif result.refused:
-            self._refused(store, row, result.error)
+        elif result.delivery is not Delivery.PENDING:
+            self._refused(store, row, result.delivery, result.error)
         elif worker.row is not None:  # else its row was given up before, and counted
             self._failed(store, row, result.error)
         worker.row = None
@@ -217,11 +225,11 @@ class Dispatcher:
                 worker.end()
                 self._workers[name] = Worker(name, worker.channel, self._report)
 
-    def _refused(self, store: OutboxStore, row: OutboxRow, error: str) -> None:
+    def _refused(self, store: OutboxStore, row: OutboxRow, delivery: Delivery, error: str) -> None:
         now, others = self._clock(), [name for name in self._channels if name != row.channel]
         is_report = row.alert.id.startswith(_REPORT)  # of which no report is made: it would go round
         report = None if is_report or not others else _report_of(row, error, now)
-        store.refused(row.id, error, now, report, others)
+        store.refused(row.id, delivery, error, now, report, others)
         self._waiting.pop(row.id, None)
         log.error("alert refused for good", **_about(row), error=error)
         if report is not None:
@@ -238,6 +246,13 @@ class Dispatcher:
             attempts=row.attempts + 1,
             retry_in=round(delay, 1),
         )
+
+
+def _with_reason(row: OutboxRow) -> OutboxRow:
+    """The row with a message that says so where nobody acknowledged its incident."""
+    if row.unacknowledged is None:
+        return row
+    return replace(row, alert=escalated(row.alert, row.unacknowledged))
 
 
 def _report_of(row: OutboxRow, error: str, now: float) -> Alert:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gliderwatch.alerts.page import Page
-from gliderwatch.alerts.words import clean, duration, flow, known, map_link, place, utc
+from gliderwatch.alerts.words import INCIDENTS, clean, duration, flow, known, map_link, place, utc
 from gliderwatch.model import Alert, Assessment, Incident, Kind, Severity
 
 
@@ -185,7 +185,7 @@ def current(dive: Assessment) -> tuple[float | None, float | None]:
 
 def _weighed(a: Absence) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """What speaks for trouble of the glider, and what against."""
-    names = [f"{i.kind.replace('_', ' ')} open since {utc(i.since)}" for i in a.incidents]
+    names = [f"{INCIDENTS[i.kind]} open since {utc(i.since)}" for i in a.incidents]
     fleet, well = a.fleet, a.fleet.others - a.fleet.late
     calling = (f"{well} of {fleet.others} other gliders call as expected",) if well > 0 else ()
     late = (f"{fleet.late} of {fleet.others} other gliders are late as well",) if fleet.late else ()

@@ -1,4 +1,4 @@
-"""Handing a mail to its server, with the server and the people that Apprise read from the URL."""
+"""Handing a mail to its server."""
 
 from __future__ import annotations
 
@@ -8,70 +8,50 @@ import ssl
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from email.errors import MessageError
-from typing import Any
 
-from gliderwatch.alerts.mail import Envelope, compose
+from gliderwatch.alerts.mail import compose
+from gliderwatch.alerts.mailto import MailServer
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.model import Alert
-
-PARTLY = "only some took it: "
-"""How the text of a refusal begins where other addresses of the channel took the message."""
 
 
 class DeliveryError(GliderwatchError):
     """A message was not surely delivered. The text holds no secret of the channel's URL.
 
-    ``permanent``: the same message would be refused again, however often it is tried.
+    ``permanent``: the same message would be refused again, however often it is tried; ``partly``: other
+    addresses of the channel took it.
     """
 
-    def __init__(self, text: str, *, permanent: bool = False) -> None:
+    def __init__(self, text: str, *, permanent: bool = False, partly: bool = False) -> None:
         super().__init__(text)
-        self.permanent = permanent
+        self.permanent, self.partly = permanent, partly
 
 
-def envelope_of(service: Any) -> Envelope:
-    """Who writes to whom, as Apprise read it from the URL of a mail channel."""
-
-    def person(address: str) -> tuple[str, str]:
-        return (service.names.get(address) or "", address)
-
-    return Envelope(
-        sender=(service.from_addr[0] or "gliderwatch", service.from_addr[1]),
-        to=[(name or "", address) for name, address in service.targets],
-        cc=[person(address) for address in sorted(service.cc)],
-        bcc=sorted(service.bcc),
-        reply_to=[person(address) for address in sorted(service.reply_to)],
-        headers=service.headers,
-    )
-
-
-def submit(
-    service: Any, alert: Alert, envelope: Envelope, recipients: list[str]
-) -> dict[str, tuple[int, bytes]]:
+def submit(server: MailServer, alert: Alert, recipients: list[str]) -> dict[str, tuple[int, bytes]]:
     """Hand the mail to the server; returns who was refused. Raises DeliveryError when nobody was served."""
     try:
-        mail = compose(alert, envelope)
+        mail = compose(alert, server.envelope)
     except (ValueError, MessageError) as error:
         raise DeliveryError(f"cannot be written as a mail: {error}", permanent=True) from None
-    with _session(service) as smtp:
+    with _session(server) as smtp:
         try:
-            return smtp.send_message(mail, envelope.sender[1], recipients)
+            return smtp.send_message(mail, server.envelope.sender[1], recipients)
         except smtplib.SMTPRecipientsRefused as error:
             return error.recipients
 
 
-def reach(service: Any) -> None:
+def reach(server: MailServer) -> None:
     """Connect to the server and log in, and send nothing. Raises DeliveryError where that cannot be done."""
-    with _session(service):
+    with _session(server):
         pass
 
 
 @contextmanager
-def _session(service: Any) -> Iterator[smtplib.SMTP]:
+def _session(server: MailServer) -> Iterator[smtplib.SMTP]:
     """A connection; what goes wrong with it inside is raised as DeliveryError."""
-    server = f"mail server {service.smtp_host}:{service.port}"
+    name = f"mail server {server.host}:{server.port}"
     try:
-        smtp = _connect(service)
+        smtp = _connect(server)
         try:
             yield smtp
         finally:
@@ -80,33 +60,32 @@ def _session(service: Any) -> Iterator[smtplib.SMTP]:
                 smtp.quit()
             smtp.close()
     except smtplib.SMTPDataError as error:
-        reason = f"{server}: {error.smtp_code} {_decode(error.smtp_error)}"
+        reason = f"{name}: {error.smtp_code} {_decode(error.smtp_error)}"
         raise DeliveryError(reason, permanent=is_permanent(error.smtp_code)) from None
     except smtplib.SMTPResponseException as error:  # of the log-in or the sender: that can be mended
-        raise DeliveryError(f"{server}: {error.smtp_code} {_decode(error.smtp_error)}") from None
+        raise DeliveryError(f"{name}: {error.smtp_code} {_decode(error.smtp_error)}") from None
     except (OSError, smtplib.SMTPException, ValueError, MessageError) as error:
-        raise DeliveryError(f"{server}: {str(error) or type(error).__name__}") from None
+        raise DeliveryError(f"{name}: {str(error) or type(error).__name__}") from None
 
 
-def _connect(service: Any) -> smtplib.SMTP:
+def _connect(server: MailServer) -> smtplib.SMTP:
     """A connection as the URL asks for it, logged in."""
     context = ssl.create_default_context()
-    if not service.verify_certificate:
+    if not server.verify:
         context.check_hostname = False
         context.verify_mode = ssl.CERT_NONE
-    timeout = service.socket_connect_timeout
     name = socket.gethostname()  # without it smtplib asks the DNS for our own name, which may hang
-    if service.secure_mode == "ssl":
+    if server.mode == "ssl":
         smtp: smtplib.SMTP = smtplib.SMTP_SSL(
-            service.smtp_host, service.port, name, timeout=timeout, context=context
+            server.host, server.port, name, timeout=server.timeout, context=context
         )
     else:
-        smtp = smtplib.SMTP(service.smtp_host, service.port, name, timeout=timeout)
+        smtp = smtplib.SMTP(server.host, server.port, name, timeout=server.timeout)
     try:
-        if service.secure_mode == "starttls":
+        if server.mode == "starttls":
             smtp.starttls(context=context)
-        if service.user and service.password:
-            smtp.login(service.user, service.password)
+        if server.login is not None:
+            smtp.login(*server.login)
     except BaseException:
         smtp.close()
         raise

@@ -5,7 +5,11 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from math import atan2, degrees, hypot, isfinite
 
+from gliderwatch.model import Kind
+
 UNKNOWN = "unknown"
+INCIDENTS = {Kind.ANOMALY: "anomaly", Kind.FALSE_ALARM: "disagreement of measurements"}
+"""Kinds of incidents for pilots. The papers' word for the second, false alarm, would read as "ignore"."""
 
 
 def clean(text: str, limit: int = 200) -> str:

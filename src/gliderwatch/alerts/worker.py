@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from enum import StrEnum
 from queue import SimpleQueue
 from typing import Protocol
 
@@ -14,14 +15,30 @@ from gliderwatch.alerts.channels import DeliveryError
 from gliderwatch.model import Alert
 
 
+class Delivery(StrEnum):
+    """How it stands with one message on one channel."""
+
+    PENDING = "pending"
+    DELIVERED = "delivered"
+    REFUSED = "refused"
+    PARTLY_REFUSED = "partly_refused"
+    UNREADABLE = "unreadable"
+    WITHDRAWN = "withdrawn"
+
+
 @dataclass(frozen=True, slots=True)
 class OutboxRow:
-    """One alert for one channel; ``attempts`` counts the failed ones so far."""
+    """One alert for one channel; ``attempts`` counts the failed ones so far.
+
+    ``unacknowledged``: it goes out because nobody acknowledged its incident for so long (s; None: it does
+    not).
+    """
 
     id: int
     alert: Alert
     channel: str
     attempts: int
+    unacknowledged: float | None = None
 
 
 class Sender(Protocol):
@@ -38,11 +55,11 @@ class Sender(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What became of a row: no ``error`` means delivered; ``refused``: for good."""
+    """What became of a row: ``PENDING`` is to be tried again. ``error`` has the failure in words."""
 
     row: OutboxRow
-    error: str | None
-    refused: bool
+    error: str
+    delivery: Delivery
     seconds: float
     worker: Worker
 
@@ -75,11 +92,18 @@ class Worker:
         with suppress(Exception):  # the first send tells what is wrong with the channel
             self.channel.prepare()
         while (row := self._inbox.get()) is not None:
-            begun, error, refused = time.monotonic(), None, False
+            begun, error, delivery = time.monotonic(), "", Delivery.DELIVERED
             try:
                 self.channel.send(row.alert)
             except DeliveryError as failure:
-                error, refused = str(failure), failure.permanent
+                error, delivery = str(failure), _delivery(failure)
             except Exception as failure:  # a text of unknown making could hold a secret
-                error = f"unexpected {type(failure).__name__}"
-            self._report(Result(row, error, refused, time.monotonic() - begun, self))
+                error, delivery = f"unexpected {type(failure).__name__}", Delivery.PENDING
+            self._report(Result(row, error, delivery, time.monotonic() - begun, self))
+
+
+def _delivery(failure: DeliveryError) -> Delivery:
+    """How it stands with a message after a channel failed to take it."""
+    if not failure.permanent:
+        return Delivery.PENDING
+    return Delivery.PARTLY_REFUSED if failure.partly else Delivery.REFUSED

@@ -55,9 +55,15 @@ class Config(Section):
         return self._of(name).params()
 
     def attention(self, name: str) -> Attention:
-        """How the silence of a glider is taken."""
-        glider = self.gliders.get(name.lower(), Glider())
-        return Attention(self._of(name).overdue_hours, glider.muted_until, glider.recovered)
+        """When a glider is spoken of that is silent or cannot be judged."""
+        glider, settings = self.gliders.get(name.lower(), Glider()), self._of(name)
+        return Attention(
+            settings.overdue_hours,
+            glider.muted_until,
+            glider.recovered,
+            settings.unknown_hours,
+            settings.unknown_dives,
+        )
 
     def defaults_params(self) -> GliderParams:
         """Parameters of a glider that has no settings of its own."""

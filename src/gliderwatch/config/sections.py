@@ -20,10 +20,11 @@ from gliderwatch.config.fields import (
     Switch,
 )
 from gliderwatch.config.section import Section
-from gliderwatch.params import AnomalyRule, FalseAlarmRule, GliderParams, LearnerParams, RuleParams
+from gliderwatch.params import AnomalyRule, Attention, FalseAlarmRule, GliderParams, LearnerParams, RuleParams
 
 _G = GliderParams()
 _E, _R = _G.learner, _G.rules
+_A = Attention()
 
 
 class NormalSpeed(Section):
@@ -43,7 +44,7 @@ class Detection(Section):
 
     gamma_f: Annotated[Number, Field(ge=0, le=1)] = Field(
         default=_G.gamma_f,
-        description="Flow error p_E (0 to 1) above which `adaptive` and `composite` give flag 2, and any "
+        description="Flow error p_E (0 to 1) above which `adaptive` gives flag 2, and any "
         "estimator where the reference is not the DAC; 1: never.",
     )
     alarms_per_month: Annotated[Number, Field(gt=0, le=30)] = Field(
@@ -53,7 +54,7 @@ class Detection(Section):
 
 
 class Adaptive(Section):
-    """Gains and basis functions of the trajectory learner (estimators `adaptive` and `composite`)."""
+    """Gains and basis functions of the trajectory learner (estimator `adaptive`)."""
 
     kernel: Literal["exponential", "gaussian"] = Field(
         default=_E.kernel,
@@ -77,10 +78,6 @@ class Adaptive(Section):
     )
     nu: Annotated[Number, Field(ge=-6.3, le=6.3)] = Field(
         default=_E.nu, description="Phase of the basis functions (rad)."
-    )
-    flow_gain: Annotated[Number, Field(gt=0, le=0.1)] = Field(
-        default=_E.flow_gain,
-        description="Rate (1/s) at which `composite` draws the learnt flow to the reference.",
     )
     max_speed: Annotated[Number, Field(gt=0, le=5)] | None = Field(
         default=_E.max_speed, description="Speed (m/s) at which the estimate saturates; null: it does not."
@@ -138,10 +135,10 @@ class Preset(Section):
     """Settings of one published deployment (`config/presets.yml`)."""
 
     normal_speed: NormalSpeed = Field(default=NormalSpeed(), description="Normal speeds.")
-    estimator: Literal["joint", "adaptive", "composite"] = Field(
+    estimator: Literal["joint", "adaptive"] = Field(
         default=_G.estimator,
         description="`joint`: speed, flow and their uncertainty from fixes, headings and currents; "
-        "`adaptive`: the trajectory learner of the papers; `composite`: the same, drawn to the reference.",
+        "`adaptive`: the trajectory learner of the papers.",
     )
     reference: Literal["dac", "tides", "learnt", "model"] = Field(
         default=_G.reference,
@@ -163,6 +160,17 @@ class Settings(Preset):
         default=None,
         description="Hours past the expected surfacing after which a silent glider is overdue; null: 40 min "
         "and the longest of 3 h, one interval between surfacings, 3 standard errors of the expected time.",
+    )
+
+    unknown_hours: Annotated[Number, Field(gt=0, le=720)] | None = Field(
+        default=_A.unknown_hours,
+        description="Hours without a dive that could be judged, although files come, after which that is "
+        "told (at least two intervals between surfacings); null: hours do not count.",
+    )
+    unknown_dives: Count | None = Field(
+        default=_A.unknown_dives,
+        description="Dives in a row that could not be judged after which that is told; null: their number "
+        "does not count.",
     )
 
     preset: str | None = Field(default=None, description="Name of a preset; keys given here win over it.")

@@ -123,10 +123,17 @@ class Operator(Section):
     """When those who run gliderwatch are told that the watch itself is in trouble."""
 
     silent_hours: Annotated[Number, Field(gt=0, le=8760)] | None = Field(
-        default=24.0, description="Hours without a file of any glider; null: never told."
+        default=24.0,
+        description="Hours without a file of any glider, or of one in the water while others call; "
+        "null: never told.",
     )
     quarantined_per_day: Annotated[int, Field(strict=True, ge=1, le=100_000)] | None = Field(
-        default=20, description="More files than so many quarantined within 24 h; null: never told."
+        default=20,
+        description="More files of one glider than so many quarantined within 24 h; null: never told.",
+    )
+    waiting_hours: Annotated[Number, Field(gt=0, le=8760)] | None = Field(
+        default=6.0,
+        description="Hours that files of a glider have waited (for a cache file, ...); null: never told.",
     )
     channel_hours: Annotated[Number, Field(gt=0, le=720)] | None = Field(
         default=1.0,

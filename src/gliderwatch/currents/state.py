@@ -87,14 +87,6 @@ class Prediction:
     notes: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Displacement:
-    """How far the water carries a glider: ``x`` (m, (2,): east, north), covariance ``cov`` (m2, (2, 2))."""
-
-    x: Array
-    cov: Array
-
-
 def learn(state: Currents, start: float, end: float, current: Array, sigma: float) -> Currents:
     """The state after a dive from ``start`` to ``end`` (s) whose ``current`` (m/s, (2,)) is believed.
 
@@ -138,15 +130,6 @@ def predict(state: Currents, start: float, end: float) -> Prediction | None:
         return None
     source = _tides_words(state) if chosen == "tides" else chosen
     return Prediction(found[chosen].mean, found[chosen].cov, source, notes(state))
-
-
-def displacement(state: Currents, start: float, end: float) -> Displacement | None:
-    """How far the water carries a glider between two times (s); None where `predict` gives None."""
-    found = predict(state, start, end)
-    if found is None:
-        return None
-    lasts = end - start
-    return Displacement(readonly(found.flow * lasts), readonly(found.cov * lasts**2))
 
 
 def choice(state: Currents) -> str:

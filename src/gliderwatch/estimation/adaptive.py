@@ -20,14 +20,6 @@ along and across psi the equations part into two damped oscillators
 (r: the velocity not yet explained; b = gamma |phi|², plus speed_gain |psi|² along psi unless the
 speed is saturated), whose solution is known. The Lyapunov function of 001 eq. (16) can not grow in
 such a substep, so that no spacing is unstable; the only error is that of phi within a substep.
-
-Composite adaptation adds a pull towards a flow F_M that is known from elsewhere (the depth-averaged current),
-in the one direction of xi that F depends on here and now:
-
-    xi' = gamma eps outer phi + kappa (F_M - xi phi) outer phi / |phi|²
-
-Then F' = b eps + kappa (F_M - F): the equations stay linear, along and across psi (`oscillator.pulled`), and
-what the pull adds to the slope of the Lyapunov function about F_M, -kappa |F_M - F|² / b, is never positive.
 """
 
 from __future__ import annotations
@@ -41,12 +33,9 @@ import numpy as np
 
 from gliderwatch.estimation.basis import Basis, Kernel, phi
 from gliderwatch.estimation.excitation import excitation, excite
-from gliderwatch.estimation.oscillator import alone, pulled
+from gliderwatch.estimation.oscillator import response
 from gliderwatch.estimation.substeps import Complex, Substeps, cut
 from gliderwatch.model import Array, readonly
-
-FAINT = 0.1
-"""|phi|² below which the pull fades with it: weights that explain a flow by next to nothing would be huge."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +45,7 @@ class AdaptiveParams:
     ``sigma`` width (m), ``kernel`` see `Basis`, ``omega`` angular frequency (rad/s), ``nu`` phase
     (rad), ``k`` K (1/s; Table I has a multiple of the unit matrix), ``gamma`` learning rate of the
     flow (1/s²), ``speed_gain`` that of the speed (1/s²; gamma when None, as in 001), ``max_speed``
-    u_0 (m/s) beyond which the learnt speed saturates (001 eq. 3; never when None), ``flow_gain`` kappa
-    (1/s) with which the flow is drawn to a reference (0: as in 001).
+    u_0 (m/s) beyond which the learnt speed saturates (001 eq. 3; never when None).
     Raises ValueError when sigma or k is not positive or a learning rate negative.
     """
 
@@ -69,15 +57,12 @@ class AdaptiveParams:
     gamma: float
     speed_gain: float | None = None
     max_speed: float | None = None
-    flow_gain: float = 0.0
 
     def __post_init__(self) -> None:
         if not (self.sigma > 0.0 and self.k > 0.0):
             raise ValueError(f"sigma and k must be positive, not {self.sigma} and {self.k}")
         if not (self.gamma >= 0.0 and self.rate_of_speed >= 0.0):
             raise ValueError(f"gamma and speed_gain must not be negative: {self.gamma}, {self.speed_gain}")
-        if not 0.0 <= self.flow_gain < math.inf:
-            raise ValueError(f"flow_gain must not be negative: {self.flow_gain}")
 
     @property
     def rate_of_speed(self) -> float:
@@ -154,26 +139,22 @@ def advance(
     heading: Array,
     basis: Basis,
     params: AdaptiveParams,
-    reference: tuple[float, float] | None = None,
 ) -> tuple[AdaptiveState, AdaptiveInfo]:
     """Learn from one more stretch of the track.
 
     ``t`` (s, shape (n,), increasing), ``x`` (m, (n, 2)), ``heading`` (unit vectors east, north, (n-1, 2))
     holding from t[i] to t[i+1], or their mean where it turned within; a row of zeros means at the
     surface: the speed is left alone there. The track is straight between its points. A track in
-    pieces gives what the whole gives. ``reference`` F_M (m/s: east, north) draws the flow by
-    ``params.flow_gain`` while the glider flies: a depth-averaged current tells nothing of the surface.
+    pieces gives what the whole gives.
     Raises ValueError when the shapes do not fit, t does not increase or a number is not finite.
     """
     if state.xi.shape != (2, len(basis)):
         raise ValueError(
             f"{state.xi.shape[1]} weights for {len(basis)} basis functions: use with_basis first"
         )
-    if reference is not None and not np.isfinite(reference).all():
-        raise ValueError(f"the reference flow must be finite, not {reference}: leave it out if unknown")
     steps = cut(t, x, heading)
     values = phi(*steps.middle, basis)
-    e, e_delta, speed, xi = _integrate(state, steps, values, params, reference)
+    e, e_delta, speed, xi = _integrate(state, steps, values, params)
     z = steps.x - e
     flow = np.sum(xi * phi(np.column_stack([z.real, z.imag]), steps.t, basis), axis=1)
     flown, gram = excite(state.flown, state.gram, steps, values)
@@ -191,48 +172,11 @@ def advance(
     return after, info
 
 
-def euler_step(
-    state: AdaptiveState,
-    t: float,
-    dt: float,
-    x: Array,
-    x_next: Array,
-    *,
-    heading: Array,
-    basis: Basis,
-    params: AdaptiveParams,
-    reference: tuple[float, float] | None = None,
-) -> AdaptiveState:
-    """Lines 2 to 7 of Algorithm 1 to the letter: one step of Euler's rule, for dense data only.
-
-    From time ``t`` (s) and place ``x`` (m, (2,)) to t + ``dt`` and ``x_next``, under ``heading`` (unit
-    vector, (2,)), with the pull to ``reference`` (m/s) as in `advance`. All right-hand sides use the old
-    state. Stable for K dt well below 1. Does not follow the excitation. `advance` converges to the
-    same as dt goes to 0.
-    """
-    values = phi(x, t, basis)
-    gap = np.zeros(2) if reference is None or not heading.any() else reference - state.xi @ values
-    pull = params.flow_gain / max(float(values @ values), FAINT)
-    u_0 = math.inf if params.max_speed is None else params.max_speed
-    eps = state.e - state.e_delta
-    z_rate = state.xi @ values + state.speed * heading + params.k * state.e
-    e_delta_rate = (min(state.speed, u_0) - state.speed) * heading - params.k * state.e_delta
-    return AdaptiveState(
-        e=readonly(state.e + (x_next - x) - z_rate * dt),
-        e_delta=readonly(state.e_delta + e_delta_rate * dt),
-        xi=readonly(state.xi + dt * np.outer(params.gamma * eps + pull * gap, values)),
-        speed=state.speed + params.rate_of_speed * dt * float(eps @ heading),
-        gram=state.gram,
-        flown=state.flown,
-    )
-
-
 def _integrate(
     state: AdaptiveState,
     steps: Substeps,
     values: Array,
     params: AdaptiveParams,
-    reference: tuple[float, float] | None,
 ) -> tuple[Complex, complex, float, Complex]:
     """Errors e (m+1,) and weights xi (m+1, N) at the ends of the substeps; e_delta and V_L at the last."""
     u_0 = math.inf if params.max_speed is None else params.max_speed
@@ -240,20 +184,17 @@ def _integrate(
     eps = e[0] - e_delta
     xi = np.empty((len(steps.h) + 1, len(state.gram) - 2), dtype=np.complex128)
     xi[0] = state.xi[0] + 1j * state.xi[1]
-    target = complex(*reference) if reference is not None else None
-    rows = _rows(steps, values, params, target is not None)
-    for i, (phi_i, rate, m, unit, pull, fade, build, free, stiff) in enumerate(rows):
+    for i, (phi_i, rate, m, unit, fade, build, free, stiff) in enumerate(_rows(steps, values, params)):
         flow = complex(xi[i] @ phi_i)
         used = min(speed, u_0)
         r = (rate - flow) * unit.conjugate() - m * used
-        gap = (target - flow) * unit.conjugate() if target is not None else 0j
         eps *= unit.conjugate()
         # beyond u_0 the speed no longer acts on eps, which leaves the stiffness of the flow alone
-        along = _moved(free if speed <= u_0 else stiff, eps.real, r.real, gap.real)
-        across = _moved(stiff, eps.imag, r.imag, gap.imag)
-        end, integral, gaps = (complex(p, q) for p, q in zip(along, across, strict=True))
+        along = _moved(free if speed <= u_0 else stiff, eps.real, r.real)
+        across = _moved(stiff, eps.imag, r.imag)
+        end, integral = (complex(p, q) for p, q in zip(along, across, strict=True))
         eps = unit * end
-        xi[i + 1] = xi[i] + (params.gamma * unit * integral) * phi_i + (pull * unit * gaps) * phi_i
+        xi[i + 1] = xi[i] + (params.gamma * unit * integral) * phi_i
         excess = used - speed
         speed += params.rate_of_speed * m * integral.real
         # the excess varies within the substep: the mean of its ends stands for it
@@ -263,28 +204,21 @@ def _integrate(
     return np.array(e), e_delta, speed, xi
 
 
-def _moved(answer: Any, eps: float, r: float, gap: float) -> tuple[float, float, float]:
-    """The error after a substep, and the integrals of error and gap over it, in one direction."""
-    (a, b, c), (d, e, f), (g, h, k) = answer
-    return a * eps + b * r + c * gap, d * eps + e * r + f * gap, g * eps + h * r + k * gap
+def _moved(answer: Any, eps: float, r: float) -> tuple[float, float]:
+    """The error after a substep, and its integral over it, in one direction."""
+    a, c, q = answer
+    return a * eps + c * r, c * eps + q * r
 
 
-def _rows(
-    steps: Substeps, values: Array, params: AdaptiveParams, referenced: bool
-) -> Iterator[tuple[Any, ...]]:
+def _rows(steps: Substeps, values: Array, params: AdaptiveParams) -> Iterator[tuple[Any, ...]]:
     """What `_integrate` needs of each substep, as Python numbers: much faster one by one than NumPy's."""
     m = np.abs(steps.psi)
     unit = np.where(m > 0.0, steps.psi, 1.0) / np.where(m > 0.0, m, 1.0)
     square = np.sum(values * values, axis=1)
     b, c = params.gamma * square, params.rate_of_speed * m * m
-    pull = np.where(m > 0.0, params.flow_gain * referenced, 0.0) / np.maximum(square, FAINT)
     fade = np.exp(-params.k * steps.h)
-    if pull.any():
-        free = pulled(params.k, b, c, pull * square, steps.h)
-        stiff = pulled(params.k, b, 0.0 * c, pull * square, steps.h)
-    else:
-        free, stiff = alone(params.k, b + c, steps.h), alone(params.k, b, steps.h)
-    columns = (steps.rate, m, unit, pull, fade, (1.0 - fade) / params.k, free, stiff)
+    free, stiff = response(params.k, b + c, steps.h), response(params.k, b, steps.h)
+    columns = (steps.rate, m, unit, fade, (1.0 - fade) / params.k, free, stiff)
     return zip(values.astype(np.complex128), *(c.tolist() for c in columns), strict=True)
 
 

@@ -8,7 +8,6 @@ first ones if they will do, because growth that slows a glider over weeks is not
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import compress
 from math import isfinite
@@ -19,7 +18,8 @@ from numpy.typing import NDArray
 
 from gliderwatch.estimation.range import LIKE
 from gliderwatch.estimation.reckoned import MAD_TO_SIGMA
-from gliderwatch.model import Array, readonly
+from gliderwatch.model import Array, DiveFeatures, readonly
+from gliderwatch.navigation.features import evidence
 
 FIRST, RECENT = 12, 12
 """Healthy dives kept of those at a like setting of the thruster: the first and the latest."""
@@ -27,8 +27,8 @@ MOST = 144
 """Dives kept of all settings: six settings' worth."""
 LEAST = 5
 """Dives that tell what is usual."""
-SHORTEST, BRIEF = 1.0, 0.5
-"""h: a shorter dive teaches nothing, because after launch pilots try out the ballast; and one so short that
+SHORTEST, BRIEF = 3600.0, 1800.0
+"""s: a shorter dive teaches nothing, because after launch pilots try out the ballast; and one so short that
 its numbers are those of its turns is not compared."""
 WIDTH = 4.0
 """Half width of a range in robust standard deviations."""
@@ -88,14 +88,14 @@ class Usual:
     high: float
 
 
-def learn(baseline: Baseline, evidence: Mapping[str, float]) -> Baseline:
+def learn(baseline: Baseline, features: DiveFeatures) -> Baseline:
     """The baseline with one more dive. Only for dives that are healthy, and not while an incident is open.
 
     A new deployment begins with ``Baseline()``.
     """
-    if evidence.get("duration_h", 0.0) < SHORTEST:
+    if features.duration < SHORTEST:
         return baseline
-    row = _row(evidence)
+    row = _row(features)
     dives = np.concatenate([_dives(baseline), row[None]])
     alike = np.flatnonzero(_same_setting(dives, row))
     if len(alike) > FIRST + RECENT:
@@ -105,11 +105,11 @@ def learn(baseline: Baseline, evidence: Mapping[str, float]) -> Baseline:
     return Baseline(readonly(np.where(known, dives, 0.0)), readonly(known))
 
 
-def compare(baseline: Baseline, evidence: Mapping[str, float]) -> dict[str, Usual]:
+def compare(baseline: Baseline, features: DiveFeatures) -> dict[str, Usual]:
     """The numbers of a dive of which enough healthy dives tell what is usual, by name."""
-    if evidence.get("duration_h", 0.0) < BRIEF:
+    if features.duration < BRIEF:
         return {}
-    row = _row(evidence)
+    row = _row(features)
     dives = _dives(baseline)
     dives = dives[_same_setting(dives, row)]
     same = {given: _same_trim(dives, row, given) for given in {q.given for q in QUANTITIES}}
@@ -121,39 +121,38 @@ def compare(baseline: Baseline, evidence: Mapping[str, float]) -> dict[str, Usua
     return out
 
 
-def told(baseline: Baseline, evidence: Mapping[str, float]) -> dict[str, float]:
+def told(baseline: Baseline, features: DiveFeatures) -> dict[str, float]:
     """What a dive adds to its evidence: `derived` numbers, and what is usual.
 
     ``_low``, ``_usual`` and ``_high`` are put after each name that `compare` knows; ``surfacing_delay_h``
     is how much later than usual the dive ended (h).
     """
-    out = derived(evidence)
-    for name, usual in compare(baseline, evidence).items():
+    out = derived(features)
+    for name, usual in compare(baseline, features).items():
         out |= {f"{name}_low": usual.low, f"{name}_usual": usual.usual, f"{name}_high": usual.high}
         if name == "duration_h":
             out["surfacing_delay_h"] = usual.value - usual.usual
     return out
 
 
-def derived(evidence: Mapping[str, float]) -> dict[str, float]:
+def derived(features: DiveFeatures) -> dict[str, float]:
     """Numbers made of others.
 
     ``pitch_asymmetry`` (rad) is by how much the climb is steeper than the dive, ``rate_ratio`` how fast the
     glider climbs as a part of how fast it dives, ``yos_per_hour`` how often it turned to climb (1/h).
 
-    >>> derived({"depth_rate_dive": 0.2, "depth_rate_climb": -0.1, "yos": 6.0, "duration_h": 3.0})
+    >>> derived(DiveFeatures(duration=10800.0, depth_rate_dive=0.2, depth_rate_climb=-0.1, yos=6))
     {'rate_ratio': 0.5, 'yos_per_hour': 2.0}
     """
-    get, out = evidence.get, {}
-    down, up = get("pitch_dive"), get("pitch_climb")
+    out = {}
+    down, up = features.pitch_dive, features.pitch_climb
     if down is not None and up is not None:
         out["pitch_asymmetry"] = abs(up) - abs(down)
-    down, up = get("depth_rate_dive"), get("depth_rate_climb")
+    down, up = features.depth_rate_dive, features.depth_rate_climb
     if down and up:
         out["rate_ratio"] = abs(up / down)
-    yos, hours = get("yos"), get("duration_h")
-    if yos and hours:
-        out["yos_per_hour"] = yos / hours
+    if features.yos and features.duration:
+        out["yos_per_hour"] = features.yos / (features.duration / 3600)
     return out
 
 
@@ -162,9 +161,12 @@ def _dives(baseline: Baseline) -> Array:
     return np.where(baseline.known > 0, baseline.dives, np.nan)
 
 
-def _row(evidence: Mapping[str, float]) -> Array:
-    """The numbers of a dive in the order of columns, NaN where unknown; no word of a thruster: it was off."""
-    known = {"thruster": 0.0, **evidence, **derived(evidence)}
+def _row(features: DiveFeatures) -> Array:
+    """The numbers of a dive in the order of columns, NaN where unknown; no word of a thruster: it was off.
+
+    They are compared as they are published, because what is usual is published beside them.
+    """
+    known = {"thruster": 0.0, **evidence(features), **derived(features)}
     return np.array([known.get(name, np.nan) for name in _COLUMN], dtype=np.float64)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from gliderwatch.model import Assessment, Dive
+from gliderwatch.navigation.features import evidence
 from gliderwatch.navigation.track import closure
 from gliderwatch.params import GliderParams
 
@@ -13,9 +14,7 @@ def blank(dive: Dive, params: GliderParams, digest: str, reason: str) -> Assessm
     ``digest`` identifies the parameters.
     """
     place = dive.end if dive.end is not None else dive.start
-    numbers = dict(dive.evidence)
-    if dive.track is not None and dive.current is not None:
-        numbers |= closure(dive.track, dive.current)
+    closed = closure(dive.track, dive.current) if dive.track and dive.current else None
     return Assessment(
         glider=dive.glider,
         segment=dive.segment,
@@ -38,7 +37,8 @@ def blank(dive: Dive, params: GliderParams, digest: str, reason: str) -> Assessm
         clle_max=None,
         excitation=None,
         n_samples=dive.n_samples,
-        evidence=numbers,
+        evidence=evidence(dive.features, closed),
         notes=dive.notes,
         parameters=digest,
+        unusable=dive.unusable,
     )

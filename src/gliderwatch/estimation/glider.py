@@ -25,7 +25,7 @@ from gliderwatch.params import GliderParams
 class Estimate:
     """State of the estimator of one glider after a dive.
 
-    ``joint`` of the estimator `joint`, ``learner`` of `adaptive` and `composite`; the one that is not chosen
+    ``joint`` of the estimator `joint`, ``learner`` of `adaptive`; the one that is not chosen
     stays empty. ``baseline`` of what corroborates, ``currents`` of the dives where the reference is their
     forecast; ``end``, the fix that ended the last dive.
     """
@@ -62,10 +62,10 @@ def step(
         after = state if learnt is state.learner else replace(state, learner=learnt)
     if dive.track is None or dive.start is None or dive.end is None:
         return after, assessment
-    evidence = {**assessment.evidence, **told(state.baseline, dive.evidence)}
+    evidence = {**assessment.evidence, **told(state.baseline, dive.features)}
     after = _with_currents(replace(after, end=dive.end), dive, params, assessment.flag)
     if assessment.flag == Flag.NORMAL and not frozen:
-        after = replace(after, baseline=learn(state.baseline, dive.evidence))
+        after = replace(after, baseline=learn(state.baseline, dive.features))
     return after, replace(assessment, evidence=evidence)
 
 

@@ -1,4 +1,4 @@
-"""Algorithms 1 and 2 advanced dive by dive: the estimators `adaptive` and `composite`. Pure.
+"""Algorithms 1 and 2 advanced dive by dive: the estimator `adaptive`. Pure.
 
 The learner is advanced over the track of each new dive and over nothing else: what the glider drifts at the
 surface between two dives is no flight. Basis functions are placed as the glider goes, or at
@@ -67,8 +67,7 @@ class Learner:
 def learner_params(params: GliderParams) -> AdaptiveParams:
     """The parameters of Algorithm 1 among those of a glider."""
     p = params.learner
-    pull = p.flow_gain if params.estimator == "composite" else 0.0
-    return AdaptiveParams(p.sigma, p.kernel, p.omega, p.nu, p.k, p.gamma, p.speed_gain, p.max_speed, pull)
+    return AdaptiveParams(p.sigma, p.kernel, p.omega, p.nu, p.k, p.gamma, p.speed_gain, p.max_speed)
 
 
 def step(
@@ -97,11 +96,6 @@ def step(
     before = learner
     learner, info = advance(learner, t, dive.track.x, dive.track.heading, basis, gains)
     reference, earlier = (other.current, False) if other is not None else _reference(state, dive)
-    if gains.flow_gain and dive.current is not None and _fits(state, dive.current, info, params):
-        drawn = (dive.current.u, dive.current.v)
-        learner, pulled = advance(before, t, dive.track.x, dive.track.heading, basis, gains, drawn)
-        # p_E asks whether the reference fits the track: the flow that was drawn to it always does
-        info = replace(pulled, flow=info.flow, flow_speed_max=info.flow_speed_max)
     maxima = update(state.maxima, info.flow_speed_max, hypot(reference.u, reference.v) if reference else 0.0)
     state = replace(
         state,
@@ -117,8 +111,8 @@ def step(
     if other is not None:
         judged = replace(judged, notes=(*judged.notes, *other.notes))
     if params.speed_learnt and judged.flag == Flag.NORMAL and not frozen:
-        hours = dive.evidence.get("duration_h", 0.0)
-        normal = learn(state.normal, info.speed, setting(dive.evidence), hours, RangeParams())
+        duration = dive.features.duration
+        normal = learn(state.normal, info.speed, setting(dive.features), duration, RangeParams())
         state = replace(state, normal=normal)
     return state, replace(judged, evidence={**judged.evidence, **_past(before)})
 
@@ -133,18 +127,11 @@ def learnt_flow(state: Learner, dive: Dive, params: GliderParams) -> Array | Non
     return np.asarray(state.learner.xi @ phi(dive.track.x[-1], t, basis))
 
 
-def _fits(state: Learner, current: Current, info: AdaptiveInfo, params: GliderParams) -> bool:
-    """Whether the current of a dive fits the flow learnt from its track alone, so that it may draw it."""
-    maxima = update(state.maxima, info.flow_speed_max, hypot(current.u, current.v))
-    flow = (float(info.flow[0]), float(info.flow[1]))
-    return p_e(flow, (current.u, current.v), maxima) <= params.gamma_f
-
-
 def _with_range(state: Learner, dive: Dive, params: GliderParams) -> GliderParams:
     """The parameters with the range of speed that was learnt, once there is one."""
     if not params.speed_learnt:
         return params
-    found = speed_range(state.normal, setting(dive.evidence), RangeParams())
+    found = speed_range(state.normal, setting(dive.features), RangeParams())
     return params if found is None else replace(params, speed_min=found.low, speed_max=found.high)
 
 
@@ -165,8 +152,8 @@ def _begin(state: Learner, dive: Dive, start: Fix, params: GliderParams) -> Lear
     """A new estimate at the start of a deployment, else the state as it is."""
     if state.learner is not None and state.end is not None and not are_apart(state.end, start):
         return state if dive.t_dive - state.end.t < STALE else replace(state, warm=0.0)
-    believed = closure(dive.track, dive.current) if dive.track and dive.current else {}
-    speed = believed.get("along_speed", dive.evidence.get("onboard_speed"))
+    closed = closure(dive.track, dive.current) if dive.track and dive.current else None
+    speed = closed.along_speed if closed is not None else dive.features.onboard_speed
     if speed is None or not 0.0 < speed < 2 * params.speed_max:
         speed = (params.speed_min + params.speed_max) / 2
     planned = np.array(params.learner.centres, dtype=np.float64).reshape(-1, 2)

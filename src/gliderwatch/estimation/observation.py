@@ -28,8 +28,6 @@ COMPASS = 0.02
 COMMANDED = 0.08
 """rad: how far the mean of the commanded headings of a dive is from that of measured ones, where only they
 are sent: 0.04 to 0.09 on the four missions that have both (robust standard deviations)."""
-UNMEASURED = ("reckoned", "commanded", "assumed")
-"""Where the headings of a dive are from when they are not those of its compass."""
 LIKELY, ASSUMED = 0.92, 0.2
 """Usual length of the mean heading vector of a dive whose headings are not known, and its standard error."""
 STEERED = 0.1
@@ -154,8 +152,13 @@ def are_apart(end: Fix, start: Fix) -> bool:
 
 def _is_free(dive: Dive) -> bool:
     """Whether the direction of a dive's heading is that which its current leaves."""
-    known = dive.evidence
-    return dive.current is not None and any(known.get(f"heading_{how}") for how in UNMEASURED)
+    return dive.current is not None and is_unmeasured(dive)
+
+
+def is_unmeasured(dive: Dive) -> bool:
+    """Whether the headings of a dive are not those of its compass."""
+    known = dive.features
+    return known.heading_reckoned or known.heading_commanded > 0 or known.heading_assumed
 
 
 def _directed(vectors: Array, velocities: Array, share: Array, dive: Dive) -> tuple[Array, Array]:
@@ -166,8 +169,8 @@ def _directed(vectors: Array, velocities: Array, share: Array, dive: Dive) -> tu
     headings, whatever current the glider had put into its way. With nothing at all the course is taken for that of a leg.
     """
     none = np.zeros((2, 2))
-    reckoned, commanded = (bool(dive.evidence.get(f"heading_{how}")) for how in UNMEASURED[:2])
-    if not len(vectors) or not any(dive.evidence.get(f"heading_{how}") for how in UNMEASURED):
+    reckoned, commanded = dive.features.heading_reckoned, dive.features.heading_commanded > 0
+    if not len(vectors) or not is_unmeasured(dive):
         return vectors, none
     flown = float(share.sum())
     if dive.current is None:
@@ -211,7 +214,7 @@ def _heading_cov(vectors: Array, share: Array, dive: Dive, interval: float) -> A
 
 def _missing(dive: Dive, interval: float, flown: float) -> Array:
     """Covariance of the mean heading vector by hours of which no data came, and by the compass on a part ``flown``."""
-    missing = UNSEEN * dive.evidence.get("unobserved_h", 0.0) * 3600 / interval
+    missing = UNSEEN * (dive.features.unobserved / 3600) * 3600 / interval
     return np.asarray((missing**2 + (COMPASS * flown) ** 2) * np.eye(2))
 
 
@@ -221,7 +224,8 @@ def _slip(dive: Dive) -> float:
     In a steady glide alpha = C_D / (a tan(theta + alpha)) (Merckelbach et al. 2010), and
     1 - tan(theta) / tan(theta + alpha) = alpha / (sin theta cos theta) to first order.
     """
-    pitches = [abs(dive.evidence[name]) for name in ("pitch_dive", "pitch_climb") if name in dive.evidence]
+    both = (dive.features.pitch_dive, dive.features.pitch_climb)
+    pitches = [abs(pitch) for pitch in both if pitch is not None]
     return slip_at(sum(pitches) / len(pitches) if pitches else USUAL_PITCH)
 
 

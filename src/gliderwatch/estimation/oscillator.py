@@ -1,13 +1,10 @@
-"""The damped oscillator that the learner is along and across the heading, alone and pulled. Pure."""
+"""The damped oscillator that the learner is along and across the heading. Pure."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from gliderwatch.model import Array
-
-TERMS = 11
-"""Of the series of an exponential: of a matrix of norm 1/4 the next is below 1e-15."""
 
 
 def response(k: float, b: Array, h: Array) -> Array:
@@ -37,53 +34,3 @@ def response(k: float, b: Array, h: Array) -> Array:
     q_weak = (h + np.expm1(-k * h) / k) / k
     q = np.where(weak, q_weak, (1.0 - even - mu * c) / np.where(weak, 1.0, b))
     return np.column_stack([even - mu * c, c, q])
-
-
-def alone(k: float, b: Array, h: Array) -> Array:
-    """`response` in the shape of `pulled`, for a flow that nothing draws: the gap moves nothing."""
-    a, c, q = response(k, b, h).T
-    zero = np.zeros(len(h))
-    return np.stack([[a, c, zero], [c, q, zero], [zero, zero, zero]]).transpose(2, 0, 1)
-
-
-def pulled(k: float, b: Array, c: Array, pull: Array, h: Array) -> Array:
-    """Solution of the oscillator while the flow is drawn to a reference: (m, 3, 3) over each of m steps.
-
-    With g the gap between reference and flow, and r_0 what of the velocity was not explained at the start,
-
-        eps' = r_0 - (g_0 - g) - c (integral of eps) - K eps,   g' = -b eps - pull g
-
-    Rows: eps after the step, the integrals of eps and of g over it. Columns: their parts by eps_0, r_0
-    and g_0. ``k`` is K (1/s, positive); ``b`` stiffness of the flow and ``c`` that of the speed (1/s², (m,)),
-    ``pull`` (1/s, (m,)), none of them negative; ``h`` the step (s, (m,)). Without a pull `response`
-    is the same with b + c.
-
-    >>> no, slow = np.array([0.0]), np.array([1e-3])
-    >>> round(pulled(0.5, no, no, slow, np.array([1e5]))[0, 2, 2])  # the gap closes in 1/pull
-    1000
-    """
-    # in units of 1/K of time and m/s all numbers are of like size; the fifth is the constant r_0 - g_0
-    a = np.zeros((len(h), 5, 5))
-    a[:, 0] = [-1.0, 1.0, 0.0, 0.0, 1.0]
-    a[:, 0, 2] = -c / k**2
-    a[:, 1, 0], a[:, 1, 1] = -b / k**2, -pull / k
-    a[:, 2, 0] = a[:, 3, 1] = 1.0
-    e = _exponential(a * (k * h)[:, None, None])
-    out = np.stack([e[:, [0, 2, 3], 0], e[:, [0, 2, 3], 4], e[:, [0, 2, 3], 1] - e[:, [0, 2, 3], 4]], axis=-1)
-    out *= np.array([1.0 / k, 1.0 / k**2, 1.0 / k])[:, None]
-    out[:, :, 0] *= k
-    return out
-
-
-def _exponential(a: Array) -> Array:
-    """Exponentials of matrices ((m, n, n)): Taylor's series of a small part of each, squared up again."""
-    size = float(np.abs(a).sum(axis=2).max(initial=0.0))
-    halvings = max(0, int(np.ceil(np.log2(max(size, 1e-300)))) + 2)  # to a norm of at most 1/4
-    part = a / 2.0**halvings
-    one = np.eye(a.shape[-1])
-    e = one + part / TERMS
-    for n in range(TERMS - 1, 0, -1):
-        e = one + part @ e / n
-    for _ in range(halvings):
-        e = e @ e
-    return e

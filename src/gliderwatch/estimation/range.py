@@ -7,7 +7,6 @@ weaker ones, because a thruster makes no glider slower.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from statistics import median
 
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from gliderwatch.estimation.measurement import FASTEST
 from gliderwatch.estimation.reckoned import MAD_TO_SIGMA
-from gliderwatch.model import Array, readonly
+from gliderwatch.model import Array, DiveFeatures, readonly
 
 LIKE = 0.1
 """Settings of a thruster (0 to 1) that differ by less are alike."""
@@ -28,7 +27,7 @@ class RangeParams:
 
     ``least`` and ``most`` are how many dives at a setting are needed and used. The half width of the range
     is ``width`` robust standard deviations; downwards at least ``narrowest`` and at most ``widest`` of the
-    median, so that a loss of 30 % is always outside, upwards at least ``above`` of it. ``shortest`` (h)
+    median, so that a loss of 30 % is always outside, upwards at least ``above`` of it. ``shortest`` (s)
     is how long a dive must be to count among the first ``trials`` of a deployment: on the short ones after
     launch pilots try out the ballast.
     """
@@ -39,7 +38,7 @@ class RangeParams:
     narrowest: float = 0.15
     widest: float = 0.25
     above: float = 0.35
-    shortest: float = 1.0
+    shortest: float = 3600.0
     trials: int = 8
 
 
@@ -62,16 +61,16 @@ class Normal:
     settings: Array = field(default_factory=lambda: readonly([]))
 
 
-def setting(evidence: Mapping[str, float]) -> float:
-    """How much the thruster was on during a dive (0: never, 1: always and fully), from ``thruster``."""
-    return evidence.get("thruster", 0.0)
+def setting(features: DiveFeatures) -> float:
+    """How much the thruster was on during a dive (0: never, 1: always and fully); not known: 0."""
+    return features.thruster or 0.0
 
 
 def learn(
-    normal: Normal, speed: float, at: float, hours: float, params: RangeParams, before: int = 0
+    normal: Normal, speed: float, at: float, duration: float, params: RangeParams, before: int = 0
 ) -> Normal:
-    """The healthy dives with one more, of some ``hours`` at a setting, after all that came ``before``."""
-    is_trial = hours < params.shortest and before < params.trials
+    """The healthy dives with one more, of a ``duration`` (s) at a setting, after all that came ``before``."""
+    is_trial = duration < params.shortest and before < params.trials
     if is_trial or int(_alike(normal, at).sum()) >= params.most:
         return normal
     return Normal(readonly([*normal.speeds, speed]), readonly([*normal.settings, at]))

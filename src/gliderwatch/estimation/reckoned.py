@@ -8,15 +8,16 @@ lags for hours after each start of a mission, so that it is taken only where the
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import tan
 from statistics import median
 
+from gliderwatch.model import DiveFeatures
+
 KEPT, FEW = 12, 3
 """Healthy dives from which a ratio is learnt, at most and at least."""
-SHORTEST = 1.0
-"""h: on a shorter dive the turns and the surface take too much of the time."""
+SHORTEST = 3600.0
+"""s: on a shorter dive the turns and the surface take too much of the time."""
 FLATTEST = 0.15
 """rad: below this pitch its tangent says too little."""
 MAD_TO_SIGMA = 1.4826
@@ -54,39 +55,41 @@ class Reckoned:
     is_prompt: bool
 
 
-def vertical(evidence: Mapping[str, float]) -> float | None:
+def vertical(features: DiveFeatures) -> float | None:
     """Mean of depth rate over tan(pitch) of dives and climbs (m/s), weighed by the time that each takes.
 
-    >>> e = {"depth_rate_dive": 0.1, "pitch_dive": -0.4, "depth_rate_climb": -0.1, "pitch_climb": 0.4}
-    >>> round(vertical(e), 4)
+    >>> round(vertical(DiveFeatures(10800.0, depth_rate_dive=0.1, pitch_dive=-0.4,
+    ...                             depth_rate_climb=-0.1, pitch_climb=0.4)), 4)
     0.2365
     """
     slowness = []
-    for way in ("dive", "climb"):
-        rate, pitch = evidence.get(f"depth_rate_{way}"), evidence.get(f"pitch_{way}")
+    for rate, pitch in (
+        (features.depth_rate_dive, features.pitch_dive),
+        (features.depth_rate_climb, features.pitch_climb),
+    ):
         if rate is None or pitch is None or abs(pitch) < FLATTEST or rate == 0:
             return None
         slowness.append(tan(abs(pitch)) / abs(rate))
     return 2 / sum(slowness)
 
 
-def learn(ratios: Ratios, evidence: Mapping[str, float], own: float) -> Ratios:
+def learn(ratios: Ratios, features: DiveFeatures, own: float) -> Ratios:
     """The ratios with those of one more healthy dive, of which W is known (m/s)."""
-    if evidence.get("duration_h", 0.0) < SHORTEST:
+    if features.duration < SHORTEST:
         return ratios
     return Ratios(
-        _with(ratios.vertical, vertical(evidence), own),
-        _with(ratios.onboard, evidence.get("onboard_speed"), own),
+        _with(ratios.vertical, vertical(features), own),
+        _with(ratios.onboard, features.onboard_speed, own),
     )
 
 
-def reckon(ratios: Ratios, evidence: Mapping[str, float]) -> Reckoned | None:
+def reckon(ratios: Ratios, features: DiveFeatures) -> Reckoned | None:
     """W as a dive tells it; None where it does not."""
-    if evidence.get("duration_h", 0.0) < SHORTEST:
+    if features.duration < SHORTEST:
         return None
     for source, value, known in (
-        (VERTICAL, vertical(evidence), ratios.vertical),
-        (ONBOARD, evidence.get("onboard_speed"), ratios.onboard),
+        (VERTICAL, vertical(features), ratios.vertical),
+        (ONBOARD, features.onboard_speed, ratios.onboard),
     ):
         found = _ratio(source, known)
         if value is not None and value > 0 and found is not None:

@@ -48,7 +48,7 @@ def of_model(ocean: Field | None, dive: Dive, start: Fix, end: Fix) -> Reference
     """The mean of a model along a dive between two fixes; ``ocean`` is None where no file could be read."""
     if ocean is None:
         return _none("the files of the ocean model could not be read")
-    depth = dive.evidence.get("depth_max")
+    depth = dive.features.depth_max
     found = ocean.between(start, end, SHALLOW if depth is None else depth)
     if isinstance(found, str):
         return _none(found)

@@ -100,13 +100,13 @@ def step(
     """
     if state.joint is not None and state.joint.end is not None and dive.start is not None:
         state = SpeedState() if are_apart(state.joint.end, dive.start) else state
-    at = setting(dive.evidence)
+    at = setting(dive.features)
     learnt = speed_range(state.normal, at, params.learning) if params.learning else None
     normal = learnt or SpeedRange(params.low, (params.low + params.high) / 2, params.high, 0)
     rolled = state.rolled + 1 if _rolls(state, dive) else 0
     usual = learnt.usual if learnt else None
     # the first of two dives may have been half over when it happened
-    told = reckon(state.ratios, dive.evidence)
+    told = reckon(state.ratios, dive.features)
     estimate, info = joint.step(state.joint, dive, params.joint, usual, hint=1 <= rolled <= 2, tells=told)
     if info is None:
         flag, reason = _of_reckoning_alone(state, dive, told, normal, params)
@@ -116,7 +116,7 @@ def step(
     if flag is None and not reason:
         state, flag, reason = _slow_or_fast(state, info, told, normal, params)
     # a course that was not steady looks slow: where no heading is known at all depth rate and pitch decide
-    assumed = flag is Flag.ANOMALY and dive.evidence.get("heading_assumed", 0.0) > 0 and told is not None
+    assumed = flag is Flag.ANOMALY and dive.features.heading_assumed and told is not None
     if (flag is None and info.seen.is_free) or assumed:
         reason = NOT_SEEN if assumed else reason
         flag, reason = _by_reckoning(reason, state, told, normal, params)
@@ -243,7 +243,7 @@ def _how_slow(info: JointInfo, normal: SpeedRange, params: SpeedParams, words: s
 
 def _rolls(state: SpeedState, dive: Dive) -> bool:
     """Whether the roll of a dive differs much from the usual one."""
-    roll = dive.evidence.get("roll_mean")
+    roll = dive.features.roll_mean
     if roll is None or dive.n_samples < ROLLS or len(state.rolls) < ROLLS:
         return False
     return abs(roll - median(state.rolls)) > ROLLED
@@ -251,14 +251,14 @@ def _rolls(state: SpeedState, dive: Dive) -> bool:
 
 def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: SpeedParams) -> SpeedState:
     """The state with what a normal dive teaches."""
-    roll = dive.evidence.get("roll_mean")
+    roll = dive.features.roll_mean
     if roll is not None and len(state.rolls) < 3 * ROLLS:
         state = replace(state, rolls=(*state.rolls, roll))
     own = info.seen.own_speed()
     if own is not None and own[1] < (2 if info.seen.is_free else 1) * OWN_SURE * own[0]:
-        state = replace(state, ratios=learn_ratios(state.ratios, dive.evidence, own[0]))
+        state = replace(state, ratios=learn_ratios(state.ratios, dive.features, own[0]))
     if params.learning is None or info.told is not None:
         return state
-    hours, before = dive.evidence.get("duration_h", 0.0), state.joint.dives - 1 if state.joint else 0
-    normal = learn(state.normal, info.estimate.speed, at, hours, params.learning, before)
+    before = state.joint.dives - 1 if state.joint else 0
+    normal = learn(state.normal, info.estimate.speed, at, dive.features.duration, params.learning, before)
     return replace(state, normal=normal)

@@ -11,7 +11,7 @@ from gliderwatch.estimation.observation import are_apart
 from gliderwatch.forecast import timing
 from gliderwatch.forecast.state import CHI2, Place, Surfacings, bearing, factor, is_same, plan
 from gliderwatch.forecast.steering import courses
-from gliderwatch.model import Array, Dive, Expected, Fix
+from gliderwatch.model import Array, Dive, Expected, Fix, Unusable
 from gliderwatch.navigation.frame import way
 
 FEW, MANY, HELD = 5, 30, 16
@@ -26,8 +26,8 @@ STEADY = 0.3
 """Length of the mean heading vector from which the speed of a dive shows."""
 SLOWEST, FASTEST = 0.05, 1.5
 """Bounds of the speed (m/s) that a glider believes."""
-UNSEEN = 0.5
-"""Hours without data in which a glider may have been up."""
+UNSEEN = 1800.0
+"""s without data in which a glider may have been up."""
 
 
 def learn(
@@ -57,11 +57,11 @@ def learn(
 
 def is_unseen(dive: Dive) -> bool:
     """Whether data are missing before the end of a dive, so that the glider may have been up unnoticed."""
-    return dive.evidence.get("unobserved_h", 0.0) > UNSEEN or dive.reason.startswith("data missing")
+    return dive.features.unobserved > UNSEEN or dive.unusable is Unusable.DATA_MISSING
 
 
 def _is_stale(dive: Dive) -> bool:
-    return dive.reason.startswith("stale")
+    return dive.unusable is Unusable.STALE_FIX
 
 
 def ground(dive: Dive) -> Array | None:

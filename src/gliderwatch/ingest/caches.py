@@ -51,9 +51,10 @@ class Staging:
         Raises `MissingCache` where none of `folders` has it, `Retry` where it is not whole or
         not the right one, `OSError` where it cannot be read.
         """
+        folders = tuple(folders)
         path = find_cache(header.crc, folders)
         if path is None:
-            raise MissingCache(header.crc)
+            raise MissingCache(header.crc, folders)
         status = path.stat()
         source = (path, status.st_size, status.st_mtime_ns)
         staged = self._known.get(header.crc)

@@ -13,7 +13,6 @@ import locale
 import logging
 import multiprocessing
 import os
-import pickle
 import resource
 import signal
 import tempfile
@@ -36,6 +35,7 @@ from gliderwatch.ingest.cycles import Sensors, intact, parse_sensor_list
 from gliderwatch.ingest.header import Header, parse_header, plain, read_regular
 from gliderwatch.ingest.scratch import Scratch
 from gliderwatch.ingest.segment import SENSORS, TIME, Samples, build_segment
+from gliderwatch.ingest.worker_result import decoded, encoded
 from gliderwatch.model import Segment
 
 _LARGEST = 512 * 1024 * 1024
@@ -238,32 +238,34 @@ def _prepare(scratch: str, memory: int) -> None:
 
 
 def _work(decode: Decode, path: Path, cache_folders: Sequence[Path], seconds: float) -> bytes:
-    """The segment or the exception, pickled (protocol 5 keeps arrays read-only).
+    """The segment or the exception, as bytes (`worker_result`).
 
     Its own alarm ends a worker that takes too long, also when nobody is there any more to end it.
     """
     signal.setitimer(signal.ITIMER_REAL, seconds)
-    outcome: Segment | GliderwatchError
+    why: GliderwatchError
     try:
-        outcome = decode(path, cache_folders)
+        return encoded(decode(path, cache_folders))
     except GliderwatchError as error:
-        outcome = error
+        why = error
     except MemoryError:
-        outcome = Quarantine("takes more memory to decode than a segment may")
+        why = Quarantine("takes more memory to decode than a segment may")
     except BaseException as error:
-        outcome = Quarantine(f"cannot be decoded ({type(error).__name__}: {str(error)[:200]})")
+        why = Quarantine(f"cannot be decoded ({type(error).__name__}: {str(error)[:200]})")
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-    return pickle.dumps(outcome, protocol=5)
+    return encoded(why)
 
 
 def _resolve(outer: Future[Segment], seconds: float, inner: Future[bytes]) -> None:
     """Hands over what a worker returned, or says in words how it ended."""
     outcome: Segment | GliderwatchError
     try:
-        outcome = pickle.loads(inner.result())
+        outcome = decoded(inner.result())
     except ProcessExpired as error:
         outcome = _ended(-error.exitcode, seconds)
+    except ValueError:
+        outcome = Quarantine("the decoder handed back something that is no segment")
     except BaseException as error:
         outcome = Retry(f"the decoder was interrupted ({type(error).__name__})")
     try:

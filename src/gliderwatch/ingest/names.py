@@ -6,7 +6,6 @@ import re
 from pathlib import PurePath
 
 _FLIGHT = {"sbd": "sbd", "mbd": "mbd", "dbd": "dbd", "scd": "sbd", "mcd": "mbd", "dcd": "dbd"}
-_SCIENCE = frozenset({"tbd", "nbd", "ebd", "tcd", "ncd", "ecd"})
 _CACHE = frozenset({"cac", "ccc"})
 _RANKS = {"sbd": 0, "mbd": 1, "dbd": 2}
 _SEGMENT = re.compile(r"(?P<glider>.+)-\d{4}-\d{1,3}-\d{1,5}-\d{1,5}", re.ASCII | re.DOTALL)
@@ -23,11 +22,6 @@ def kind(name: str) -> str | None:
     ('sbd', None, None)
     """
     return _FLIGHT.get(_suffix(name))
-
-
-def is_science(name: str) -> bool:
-    """Whether the name is that of science data (tbd, ebd, ...), known but not used."""
-    return _suffix(name) in _SCIENCE
 
 
 def is_cache(name: str) -> bool:

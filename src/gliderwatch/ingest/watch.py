@@ -5,11 +5,10 @@ from __future__ import annotations
 import ctypes
 import errno
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Thread
 from typing import Literal, Protocol
 
 from watchdog.events import (
@@ -23,7 +22,7 @@ from watchdog.events import (
     FileSystemEventHandler,
 )
 from watchdog.observers.api import BaseObserver, ObservedWatch
-from watchdog.observers.inotify import InotifyObserver
+from watchdog.observers.inotify import InotifyFullEmitter
 from watchdog.observers.inotify_c import (
     InotifyConstants,
     InotifyEvent,
@@ -140,24 +139,10 @@ class Watcher:
         if self._polls():
             observer = PollingObserverVFS(os.lstat, _polled, polling_interval=self._poll_seconds)
         else:
-            # Full events tell a file that was moved in from one that has only been begun.
-            observer = InotifyObserver(generate_full_events=True)
-            self._heed_losses(observer._inotify_fd)
+            observer = _InotifyObserver(lambda: self._queue.put(EventsLost()))
         observer.start()
         self._observer = observer
         self.refresh()
-
-    def _heed_losses(self, reader: InotifyFD) -> None:
-        """Tell of an overflow. Watchdog alone would watch again what is at each path at that moment, if
-        anything is, and never look again: a root that is away just then would be unwatched for good."""
-
-        def heed(event: InotifyEvent) -> None:
-            if event.is_queue_overflow:
-                self._queue.put(EventsLost())
-            else:
-                type(reader).handle_event(reader, event)
-
-        reader.handle_event = heed  # type: ignore[method-assign]
 
     def _polls(self) -> bool:
         return self._kind == "polling" or bool(self._instead)
@@ -202,9 +187,9 @@ class Watcher:
         observer = self._observer
         if observer is None or not observer.is_alive():
             return False
-        reader: Thread | None = getattr(observer, "_inotify_fd", None)  # one for all since watchdog 7
+        reads = not isinstance(observer, _InotifyObserver) or observer.reader.is_alive()
         emitters = [emitter for emitter in observer.emitters if is_folder(Path(emitter.watch.path))]
-        return (reader is None or reader.is_alive()) and all(emitter.is_alive() for emitter in emitters)
+        return reads and all(emitter.is_alive() for emitter in emitters)
 
     def restart(self) -> None:
         """Begins anew with a new observer."""
@@ -252,6 +237,41 @@ class Watcher:
             glider_folder = next((folder for folder in folders if folder), None)
             if glider_folder:
                 self._queue.put(FileChanged(path, glider_folder))
+
+
+class _Reader(InotifyFD):
+    """Reads what inotify reports for all folders, and reports an overflow of its queue as such.
+
+    Watchdog alone would watch again what is at each path at that moment, if anything is, and never look
+    again: a root that is away just then would be unwatched for good.
+    """
+
+    def __init__(self, on_overflow: Callable[[], object]) -> None:
+        super().__init__()
+        self._on_overflow = on_overflow
+
+    def handle_event(self, event: InotifyEvent) -> None:
+        """Pass on one event."""
+        if event.is_queue_overflow:
+            self._on_overflow()
+        else:
+            super().handle_event(event)
+
+
+class _InotifyObserver(BaseObserver):
+    """Watchdog's observer by inotify with a `_Reader` of our own, which runs from the start."""
+
+    def __init__(self, on_overflow: Callable[[], object]) -> None:
+        self.reader = _Reader(on_overflow)
+        self.reader.start()
+        # The full emitter reports a file that was moved in apart from one that has only been begun.
+        super().__init__(InotifyFullEmitter, inotify_fd=self.reader)
+
+    def on_thread_stop(self) -> None:
+        """End the emitters, then the reader they are served by."""
+        super().on_thread_stop()
+        self.reader.stop()
+        self.reader.join()
 
 
 class _Handler(FileSystemEventHandler):

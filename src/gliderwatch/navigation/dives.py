@@ -8,15 +8,15 @@ and a dive is told again when more of it is known.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 
-from gliderwatch.model import Dive, Fix, Segment
+from gliderwatch.model import Dive, Fix, Segment, Unusable
 from gliderwatch.navigation.current import EARLY, Known, Report, new_reports, pair, updated
+from gliderwatch.navigation.features import flight_features, track_features
 from gliderwatch.navigation.fixes import FASTEST, SUSPECT, distance, new_fixes, stays
 from gliderwatch.navigation.flight import SPARSE, Flight, find_flight, lengthened, unseen
 from gliderwatch.navigation.quality import flight_notes, heading_gap, segment_notes, unsteered, why_unusable
 from gliderwatch.navigation.samples import Samples, after, concatenated, get, prepare
-from gliderwatch.navigation.track import attitude, build_track, evidence
+from gliderwatch.navigation.track import build_track
 
 SHORTEST = 900.0
 """Seconds: a shorter stay under water says too little of speed, a shorter hole in the data is none."""
@@ -156,7 +156,14 @@ def _withdraw_old_fix(state: Navigation, fixes: list[Fix]) -> tuple[Navigation, 
     if fixes and state.fix is not None and state.dive.end == state.fix:
         gap = fixes[0].t - state.fix.t
         if gap < SHORTEST and distance(state.fix, fixes[0]) > FASTEST * gap + 100.0:
-            withdrawn = replace(state.dive, end=fixes[0], track=None, current=None, reason="stale fix")
+            withdrawn = replace(
+                state.dive,
+                end=fixes[0],
+                track=None,
+                current=None,
+                reason="stale fix",
+                unusable=Unusable.STALE_FIX,
+            )
             return replace(state, fix=fixes[0]), [withdrawn]
     return state, [state.dive]
 
@@ -184,19 +191,22 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
     start, seen = state.fix, flight
     if end is not None:
         flight = lengthened(flight, samples, end.t, state.holes)
-    missing = sum(min(b, end.t) - a for a, b in state.holes if a < end.t) if end is not None else 0.0
-    reason = why_unusable(samples, flight, start, end, missing)
-    if start is None or end is None or reason:
+    missing = sum((min(b, end.t) - a for a, b in state.holes if a < end.t), 0.0) if end is not None else 0.0
+    unusable, reason = why_unusable(samples, flight, start, end, missing)
+    if start is None or end is None or unusable is not None:
         track = None
-        numbers = {"duration_h": flight.duration / 3600} | attitude(samples, flight)
+        features = flight_features(samples, flight)
     else:
         track = build_track(samples, flight, start, end)
-        numbers = evidence(samples, flight, track)
-        if unsteered(samples, flight) and "heading_reckoned" not in numbers:
-            numbers["heading_assumed"] = 1.0
         gap = heading_gap(samples, flight)
-        numbers |= {"heading_gap_h": gap / 3600} if gap > 2 * SPARSE else {}
-        numbers |= {"unobserved_h": missing / 3600} if missing else {}
+        known = track_features(samples, flight, track)
+        unsure = unsteered(samples, flight)[0] is not None and not known.heading_reckoned
+        features = replace(
+            known,
+            heading_assumed=known.heading_assumed or unsure,
+            heading_gap=gap if gap > 2 * SPARSE else None,
+            unobserved=missing,
+        )
     return Dive(
         glider=glider,
         segment=state.holder,
@@ -208,8 +218,9 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
         current=None,
         reason=reason,
         n_samples=len(get(samples, "heading_e").between(flight.start, flight.end)),
-        evidence=MappingProxyType(numbers),
-        notes=state.notes + flight_notes(flight, numbers),
+        features=features,
+        notes=state.notes + flight_notes(flight, features),
+        unusable=unusable,
     )
 
 
@@ -240,15 +251,15 @@ def _with_currents(
         i = ends[k][1] if 0 <= k < len(ends) else None
         if k == len(ends):
             waiting.append(report)
-        elif i is not None and not out[i].reason.startswith("stale") and "surfacing_unseen" not in out[i].evidence:
+        elif i is not None and out[i].unusable is not Unusable.STALE_FIX and not out[i].features.surfacing_unseen:
             out[i] = replace(out[i], current=updated(out[i].current, report, out[i].t_surface))
     return out, waiting
 
 
 def _in_parts(dive: Dive) -> Dive:
     """A dive in which the glider surfaced without a fix."""
-    if "surfacing_unseen" in dive.evidence:
+    if dive.features.surfacing_unseen:
         return dive
     note = "it surfaced without a fix on the way: the currents reported are those of parts of the dive"
-    evidence = MappingProxyType({**dive.evidence, "surfacing_unseen": 1.0})
-    return replace(dive, current=None, evidence=evidence, notes=(*dive.notes, note))
+    features = replace(dive.features, surfacing_unseen=True)
+    return replace(dive, current=None, features=features, notes=(*dive.notes, note))

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from gliderwatch.model import Fix, Segment
+from gliderwatch.model import DiveFeatures, Fix, Segment, Unusable
 from gliderwatch.navigation.fixes import FASTEST, distance
 from gliderwatch.navigation.flight import SPARSE, Flight
 from gliderwatch.navigation.samples import Samples, get
 from gliderwatch.navigation.track import CIRCLING
 
-NOT_SURFACED = "no fix"
-"""The reason of a dive that has not ended, as far as known."""
 UNOBSERVED = 0.25
 """Share of the interval between two fixes that may be missing before a dive cannot be used."""
 BLIND = 0.8
@@ -25,38 +21,43 @@ SURFACE = 0.5
 """Share of the interval between two fixes that the glider may have drifted before it cannot be used."""
 
 
-def why_unusable(samples: Samples, flight: Flight, start: Fix | None, end: Fix | None, missing: float) -> str:
-    """Why the speed on a dive cannot be estimated; empty when it can.
+def why_unusable(
+    samples: Samples, flight: Flight, start: Fix | None, end: Fix | None, missing: float
+) -> tuple[Unusable | None, str]:
+    """Why the speed on a dive cannot be estimated, and the same in words; None and empty when it can.
 
     `missing`: seconds between the fixes of which no segment has come.
     """
     if end is None:
-        return NOT_SURFACED
+        return Unusable.NOT_SURFACED, "no fix"
     if start is None:
-        return "no fix before the dive"
+        return Unusable.NO_FIX_BEFORE, "no fix before the dive"
     interval = end.t - start.t
     if flight.evidence == "missing" or missing > UNOBSERVED * interval:
-        return f"data missing: {missing / 3600:.1f} of {interval / 3600:.1f} h between two fixes"
+        words = f"data missing: {missing / 3600:.1f} of {interval / 3600:.1f} h between two fixes"
+        return Unusable.DATA_MISSING, words
     if interval - flight.duration > SURFACE * interval:
-        return "mostly surface drift"
+        return Unusable.SURFACE_DRIFT, "mostly surface drift"
     over_ground = distance(start, end) / interval
-    return (
-        f"wild fix: {over_ground:.0f} m/s over ground" if over_ground > FASTEST else _blind(samples, flight)
-    )
+    if over_ground > FASTEST:
+        return Unusable.WILD_FIX, f"wild fix: {over_ground:.0f} m/s over ground"
+    return _blind(samples, flight)
 
 
-def _blind(samples: Samples, flight: Flight) -> str:
-    """Why the headings of a flight do not do; empty when they do, or when depth or pitch tell how fast it was."""
-    return "" if flight.evidence.startswith(("depth", "pitch")) else unsteered(samples, flight)
+def _blind(samples: Samples, flight: Flight) -> tuple[Unusable | None, str]:
+    """Why the headings of a flight do not do, and the same in words; None and empty when they do, or when depth or
+    pitch tell how fast it was."""
+    return (None, "") if flight.evidence.startswith(("depth", "pitch")) else unsteered(samples, flight)
 
 
-def unsteered(samples: Samples, flight: Flight) -> str:
-    """Why the course of a flight is not known from its headings; empty when it is."""
+def unsteered(samples: Samples, flight: Flight) -> tuple[Unusable | None, str]:
+    """Why the course of a flight is not known from its headings, and the same in words; None and empty when it is."""
     gap = heading_gap(samples, flight)
     if gap > BLIND * flight.duration:
-        return f"no heading for {gap / 3600:.1f} h"
-    turning = gap > 2 * SPARSE and _heading_length(samples, flight) < STEADY
-    return f"turning, and no heading for {gap / 3600:.1f} h" if turning else ""
+        return Unusable.NO_HEADING, f"no heading for {gap / 3600:.1f} h"
+    if gap > 2 * SPARSE and _heading_length(samples, flight) < STEADY:
+        return Unusable.TURNING, f"turning, and no heading for {gap / 3600:.1f} h"
+    return None, ""
 
 
 def heading_gap(samples: Samples, flight: Flight) -> float:
@@ -81,21 +82,21 @@ def segment_notes(segment: Segment, declination: float | None, from_model: bool)
     return tuple(notes)
 
 
-def flight_notes(flight: Flight, numbers: Mapping[str, float]) -> tuple[str, ...]:
+def flight_notes(flight: Flight, features: DiveFeatures) -> tuple[str, ...]:
     """What a reader of the assessment should know of the quality of a dive."""
     notes = []
     if flight.evidence == "heading":
         notes.append("no depth or pitch in the file: drift at the surface cannot be told from flight")
-    if numbers.get("heading_steadiness", 1.0) < max(CIRCLING, 0.5):
+    if features.heading_steadiness is not None and features.heading_steadiness < max(CIRCLING, 0.5):
         notes.append("the glider turned much: its speed is hardly observable")
-    if "heading_gap_h" in numbers:
-        notes.append(f"no heading for {numbers['heading_gap_h']:.1f} h of the dive: taken as steady")
-    if "heading_reckoned" in numbers:
+    if features.heading_reckoned:
         notes.append("no measured heading in the file: direction of the dead-reckoned way used")
-    if "heading_commanded" in numbers:
+    if features.heading_commanded:
         notes.append("commanded heading used, the measured one is not in the file")
-    if "heading_assumed" in numbers:
+    if features.heading_assumed:
         notes.append("headings missing: a steady course is assumed, in the direction that the current leaves")
-    if "unobserved_h" in numbers:
-        notes.append(f"{numbers['unobserved_h']:.1f} h without data within the dive")
+    if features.heading_gap is not None:
+        notes.append(f"no heading for {features.heading_gap / 3600:.1f} h of the dive: taken as steady")
+    if features.unobserved:
+        notes.append(f"{features.unobserved / 3600:.1f} h without data within the dive")
     return tuple(notes)

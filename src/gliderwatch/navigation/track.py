@@ -1,13 +1,12 @@
-"""The way of a dive and the numbers that speak for or against a fault. Pure."""
+"""The way of a dive, and whether it closes with the current. Pure."""
 
 from __future__ import annotations
 
-from math import atan2, degrees
-from statistics import median
+from typing import NamedTuple
 
 import numpy as np
 
-from gliderwatch.model import Array, Current, Fix, Series, Track, readonly
+from gliderwatch.model import Array, Current, Fix, Track, readonly
 from gliderwatch.navigation.fixes import FASTEST
 from gliderwatch.navigation.flight import SPARSE, Flight
 from gliderwatch.navigation.frame import to_plane
@@ -15,12 +14,6 @@ from gliderwatch.navigation.samples import Samples, get
 
 NOMINAL_SPEED = 0.3
 """m/s: shapes a track where the glider reports no speed; the fixes correct its length."""
-FEW = 3
-"""Samples in a dive that say how much the thruster was on, or the pump moved."""
-STEEP = 0.1
-"""rad: pitch of a glider that dives or climbs and does not turn."""
-PUMPED = 20e-6
-"""m3: a pump that moved less is on its way."""
 CIRCLING = 0.1
 """Length of the mean heading vector below which a mean direction means nothing."""
 
@@ -110,30 +103,6 @@ def _onboard(samples: Samples, t: Array, flight: Flight, start: Fix) -> Array | 
     return np.stack([np.interp(t, times, xy[:, 0]), np.interp(t, times, xy[:, 1])], axis=-1)
 
 
-def evidence(samples: Samples, flight: Flight, track: Track) -> dict[str, float]:
-    """Numbers of one dive for people and rules; keys and units in `docs/nomenclature.md`."""
-    interval = float(track.t[-1] - track.t[0])
-    mean, flown = mean_heading(track)
-    out = {
-        "duration_h": (flight.end - flight.start) / 3600,
-        "fix_gap_minutes": (float(track.t[-1]) - flight.end) / 60,
-        "drift_h": (interval - (flight.end - flight.start)) / 3600,
-        "ground_speed": float(np.hypot(*track.x[-1])) / interval,
-        "heading_steadiness": float(np.hypot(*mean)) * interval / max(flown, 1.0),
-        "heading_mean": degrees(atan2(mean[0], mean[1])) % 360,
-    }
-    commanded = get(samples, "commanded").between(flight.start, flight.end)
-    reckoned = get(samples, "reckoned").between(flight.start, flight.end)
-    headings = get(samples, "heading_e").between(flight.start, flight.end)
-    if (len(commanded) or len(reckoned) or not len(headings)) and has_reckoning(samples, flight):
-        out["heading_reckoned"] = 1.0
-    elif len(commanded):
-        out["heading_commanded"] = len(commanded) / len(headings)
-    elif len(reckoned) or not len(headings):
-        out["heading_assumed"] = 1.0
-    return out | attitude(samples, flight)
-
-
 def mean_heading(track: Track) -> tuple[Array, float]:
     """Mean over the whole interval of the heading vector (zero at the surface), and seconds flown."""
     dt = np.diff(track.t)
@@ -141,82 +110,34 @@ def mean_heading(track: Track) -> tuple[Array, float]:
     return mean, float(dt[np.any(track.heading != 0, axis=1)].sum())
 
 
-def closure(track: Track, current: Current) -> dict[str, float]:
-    """The closure test: what is left of the ground velocity (m/s) without the current.
+class Closure(NamedTuple):
+    """What is left of the ground velocity of a dive without its current.
 
-    ``along_speed`` is its part along the mean heading, divided by the length of that mean: the speed that
-    the glider's own flight model believes. ``across_misfit`` is the part across: near zero when
-    fixes, compass and current agree. ``across_sigma`` is how much of it a few headings in a dive
-    leave open: the standard error of their mean at that speed. Empty where the glider circled.
+    ``along_speed`` (m/s) is its part along the mean heading, divided by the length of that mean: the speed
+    that the glider's own flight model believes. ``across_misfit`` (m/s) is the part across: near zero when
+    fixes, compass and current agree. ``across_sigma`` (m/s) is how much of it a few headings in a dive
+    leave open: the standard error of their mean at that speed.
     """
+
+    along_speed: float
+    across_misfit: float
+    across_sigma: float
+
+
+def closure(track: Track, current: Current) -> Closure | None:
+    """The closure test of a dive; None where the glider circled."""
     mean, flown = mean_heading(track)
     length = float(np.hypot(*mean))
     interval = float(track.t[-1] - track.t[0])
     if length * interval < CIRCLING * max(flown, 1.0):
-        return {}
+        return None
     rest = track.x[-1] / interval - np.array([current.u, current.v])
     along = float(rest @ mean) / length**2
     headings = track.heading[np.any(track.heading != 0, axis=1)]
     aside = (mean[0] * headings[:, 1] - mean[1] * headings[:, 0]) / length
-    return {
-        "along_speed": along,
-        "across_misfit": float(mean[0] * rest[1] - mean[1] * rest[0]) / length,
+    return Closure(
+        along_speed=along,
+        across_misfit=float(mean[0] * rest[1] - mean[1] * rest[0]) / length,
         # a heading of the track is the mean of two samples, which halves their variance
-        "across_sigma": abs(along) * float(np.std(aside)) * (2 / len(aside)) ** 0.5,
-    }
-
-
-def attitude(samples: Samples, flight: Flight) -> dict[str, float]:
-    """Depth, pitch, roll and depth rate of the flight, as far as reported."""
-    out = {}
-    depth = get(samples, "depth").between(flight.start, flight.end)
-    pitch = get(samples, "pitch").between(flight.start, flight.end)
-    roll = get(samples, "roll").between(flight.start, flight.end)
-    speed = get(samples, "speed_onboard").between(flight.start, flight.end)
-    thruster = get(samples, "thruster_on").between(flight.start, flight.end)
-    if len(depth) > 3 and np.diff(depth.t).max() < SPARSE:
-        out["depth_max"] = float(depth.v.max())
-    for name, part in (("pitch_dive", pitch.v[pitch.v < -STEEP]), ("pitch_climb", pitch.v[pitch.v > STEEP])):
-        if len(part):
-            out[name] = float(np.mean(part))
-    if len(roll):
-        out |= {"roll_mean": float(np.mean(roll.v)), "roll_std": float(np.std(roll.v))}
-    if len(speed):
-        out["onboard_speed"] = float(np.mean(speed.v))
-    if len(thruster) >= FEW:
-        out["thruster"] = float(np.mean(thruster.v))
-    return out | _depth_rates(depth) | _yos(pitch) | _volumes(samples, flight)
-
-
-def _yos(pitch: Series) -> dict[str, float]:
-    """How often the glider turned from dive to climb."""
-    steep = pitch.v[np.abs(pitch.v) > STEEP]
-    yos = int(np.sum((steep[:-1] < 0) & (steep[1:] > 0)))
-    return {"yos": float(yos)} if yos else {}
-
-
-def _volumes(samples: Samples, flight: Flight) -> dict[str, float]:
-    """Volume pumped (m3) while diving and while climbing, of either pump, and vacuum (Pa)."""
-    out = {}
-    moved = max((get(samples, name) for name in ("ballast", "oil_volume")), key=len)
-    v = moved.between(flight.start, flight.end).v
-    # the pump has moved most of the time: what lies between is it moving
-    for name, part in (("ballast_dive", v[v < -PUMPED]), ("ballast_climb", v[v > PUMPED])):
-        if len(part) >= FEW:
-            out[name] = median(part.tolist())
-    vacuum = get(samples, "vacuum").between(flight.start, flight.end)
-    return out | ({"vacuum": median(vacuum.v.tolist())} if len(vacuum) else {})
-
-
-def _depth_rates(depth: Series) -> dict[str, float]:
-    """Median rates of descent and climb (m/s) from depths at most 5 min apart, below the surface layer."""
-    if len(depth) < 6:
-        return {}
-    dt = np.diff(depth.t)
-    near = (dt > 0) & (dt < 300) & (np.minimum(depth.v[1:], depth.v[:-1]) > 3.0)
-    rate = np.diff(depth.v)[near] / dt[near]
-    out = {}
-    for name, part in (("depth_rate_dive", rate[rate > 0.02]), ("depth_rate_climb", rate[rate < -0.02])):
-        if len(part) >= 2:
-            out[name] = median(part.tolist())
-    return out
+        across_sigma=abs(along) * float(np.std(aside)) * (2 / len(aside)) ** 0.5,
+    )

@@ -16,6 +16,7 @@ from gliderwatch.alerts import message
 from gliderwatch.model import Alert, Assessment, Expected, Incident
 from gliderwatch.rules.acknowledged import Acks
 from gliderwatch.rules.overdue import Silence
+from gliderwatch.rules.unknown import Unknown
 
 NEWS = 86400.0
 """Seconds: an incident that was over for longer when it became known is history, not news."""
@@ -41,12 +42,16 @@ class Thread:
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """What people have been told of one glider; ``surfaced`` is the surfacing of the last notice (s), and
-    ``silences`` what was told of its staying away (`rules.overdue`)."""
+    """What people have been told of one glider.
+
+    ``surfaced`` is the surfacing of the last notice (s), ``silences`` what was told of its staying away
+    (`rules.overdue`), ``unknown`` of dives that could not be judged (`rules.unknown`).
+    """
 
     threads: tuple[Thread, ...] = ()
     surfaced: float | None = None
     silences: tuple[Silence, ...] = ()
+    unknown: Unknown | None = None
 
 
 class Known(Protocol):
@@ -107,7 +112,8 @@ def due(
 
 
 def unanswered(said: Said, incidents: tuple[Incident, ...], acks: Acks) -> frozenset[str]:
-    """The threads of what goes on and nobody has taken on: open incidents, and gliders that stay away."""
+    """The threads of what goes on and nobody has taken on: incidents, and gliders that stay away or cannot
+    be judged."""
     matched = _matched(said.threads, incidents)
     threads = {
         thread.id
@@ -116,6 +122,8 @@ def unanswered(said: Said, incidents: tuple[Incident, ...], acks: Acks) -> froze
         and now.cleared_at is None
         and not _is_acknowledged(thread, now, acks)
     }
+    if said.unknown is not None and not said.unknown.is_over:
+        threads.add(said.unknown.id)
     return frozenset(threads | {silence.id for silence in said.silences if silence.called is None})
 
 

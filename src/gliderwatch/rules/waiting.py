@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime, time, timedelta, tzinfo
 from math import inf
 
-from gliderwatch.model import Severity
+from gliderwatch.model import Alert, Severity
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,3 +101,21 @@ def due(waits: Iterable[Wait], severity: Severity, now: float, standing: Standin
     if at == escalates == inf:
         return None
     return Due(at if at > now else 0.0, escalates if escalates < at else inf)
+
+
+def deliveries(
+    alert: Alert, channels: Iterable[str], now: float, standing: Callable[[str], Standing]
+) -> dict[str, Due]:
+    """When a message made `now` (s) goes out by each of its channels; one by which it does not is left out.
+
+    A mapping of `channels` tells what the recipients of each wait for; of names alone they get it at once.
+    `standing` is how its incident stands with a channel, asked only where somebody waits for that.
+    """
+    waits = channels if isinstance(channels, Mapping) else dict.fromkeys(channels, AT_ONCE)
+    found = {}
+    for channel, wait in waits.items():
+        is_asked = alert.incident and any(w.after is not None for w in wait)
+        one = due(wait, alert.audience, now, standing(channel) if is_asked else NO_INCIDENT)
+        if one is not None:
+            found[channel] = one
+    return found

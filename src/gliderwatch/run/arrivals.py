@@ -6,16 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from gliderwatch.errors import MissingCache, Quarantine, Retry
+from gliderwatch.errors import MissingCache, NotAssessed, Quarantine, Retry
 from gliderwatch.ingest.caches import find_cache
 from gliderwatch.ingest.header import read_header
 from gliderwatch.ingest.settle import Settling
+from gliderwatch.model import Hindrance
 from gliderwatch.run.backlog import Job
 from gliderwatch.store.sqlite import File, Status, Store
 
 DONE = (Status.TAKEN, Status.DUPLICATE, Status.QUARANTINED)
-RENAMED = "was renamed"
-"""Why a file that waited and has gone is a duplicate. It was not read: if it comes back, it is to be."""
 
 
 def state(path: Path) -> tuple[int, int] | None:
@@ -67,7 +66,7 @@ def judge(
         reason = f"glider {header.id.glider} is not in the configuration"
         return replace(file, status=Status.UNKNOWN, reason=reason)
     if header.factored and _is_missing(header.crc, caches):
-        return failed(file, MissingCache(header.crc))
+        return failed(file, MissingCache(header.crc, caches))
     return Job(file, header)
 
 
@@ -75,7 +74,7 @@ def _is_settled(before: File, caches: Sequence[Path], is_known: Callable[[str], 
     """Whether nothing more can be done for a file that has not changed."""
     if before.status == Status.UNKNOWN:
         return bool(before.glider) and not is_known(before.glider)
-    if before.reason == RENAMED:
+    if before.hindrance is Hindrance.RENAMED:  # it was not read: if it comes back, it is to be
         return False
     return before.status in DONE or (bool(before.crc) and _is_missing(before.crc, caches))
 
@@ -89,11 +88,15 @@ def _plain(path: Path) -> Path:
 
 def failed(file: File, error: Exception) -> File:
     """The row of a file that could not be decoded."""
+    status, why = Status.QUARANTINED, Hindrance.DAMAGED
     if isinstance(error, MissingCache):
-        return replace(file, status=Status.WAITING, reason=str(error), crc=error.crc)
-    if isinstance(error, Retry):
-        return replace(file, status=Status.WAITING, reason=str(error), crc="")
-    return replace(file, status=Status.QUARANTINED, reason=str(error), crc="")
+        status, why = Status.WAITING, Hindrance.NO_CACHE
+    elif isinstance(error, Retry):
+        status, why = Status.WAITING, Hindrance.UNREADABLE
+    elif isinstance(error, NotAssessed):
+        why = Hindrance.NOT_ASSESSED
+    crc = error.crc if isinstance(error, MissingCache) else ""
+    return replace(file, status=status, reason=str(error), crc=crc, hindrance=why)
 
 
 def _gone(before: File | None, store: Store, is_known: Callable[[str], bool]) -> File | None:
@@ -104,8 +107,8 @@ def _gone(before: File | None, store: Store, is_known: Callable[[str], bool]) ->
         return None
     if store.segments.completeness(before.glider, before.segment) is None:
         reason = "is not there any more, and its segment has not come under another name"
-        return replace(before, status=Status.WAITING, reason=reason, crc="")
-    return replace(before, status=Status.DUPLICATE, reason=RENAMED, crc="")
+        return replace(before, status=Status.WAITING, reason=reason, crc="", hindrance=Hindrance.GONE)
+    return replace(before, status=Status.DUPLICATE, reason="was renamed", crc="", hindrance=Hindrance.RENAMED)
 
 
 def _is_missing(crc: str, caches: Sequence[Path]) -> bool:

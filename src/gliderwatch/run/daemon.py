@@ -26,9 +26,9 @@ from gliderwatch.run.heartbeat import Upkeep
 from gliderwatch.run.life import BEAT, Life
 from gliderwatch.run.parts import Decoded, News, Parts, build
 from gliderwatch.run.reception import Reception
+from gliderwatch.run.retention import Retention
 from gliderwatch.run.ticking import Ticking
 from gliderwatch.run.trouble import Trouble
-from gliderwatch.store.retention import Retention
 from gliderwatch.store.sqlite import Status
 
 log = structlog.get_logger(__name__)

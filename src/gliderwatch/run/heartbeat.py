@@ -176,7 +176,7 @@ class Upkeep:
 
     def took(self, taken: Taken, seconds: float | None = None) -> None:
         """It is known what became of a file; it took so many `seconds` to take in, if it was."""
-        self._operator.came(time.monotonic())
+        self._operator.came(taken.file.glider, time.monotonic())
         self._metrics.came(taken.file, time.time())
         self._metrics.assessed(taken.assessments)
         if seconds is not None:

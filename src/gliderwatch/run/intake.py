@@ -6,19 +6,21 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
 from gliderwatch.currents.field import Field
-from gliderwatch.errors import GliderwatchError, Quarantine
+from gliderwatch.errors import GliderwatchError, NotAssessed
 from gliderwatch.model import Alert, Assessment, Segment, SegmentId
 from gliderwatch.params import Attention, GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
-from gliderwatch.rules import overdue, silence
+from gliderwatch.rules import overdue, silence, unknown
 from gliderwatch.rules.announce import due
+from gliderwatch.rules.muting import with_mute
+from gliderwatch.run.posting import post_alerts, withdraw_answered
 from gliderwatch.store.sqlite import File, Status, Store
 
 
 @dataclass(frozen=True, slots=True)
 class Speaking:
-    """Who is told: ``channels`` of an alert (a mapping says what they wait for, see `store.outbox.post`), of
-    which gliders surfacing notices are wanted, and how the silence of a glider is taken."""
+    """Who is told: ``channels`` of an alert (a mapping says what they wait for, see `run.posting`), of which
+    gliders surfacing notices are wanted, and how the silence of a glider is taken."""
 
     channels: Callable[[Alert], Iterable[str]]
     notices: Callable[[str], bool]
@@ -105,13 +107,13 @@ def tick(
         said, hours = store.said(glider), speaking.attention(glider).overdue_hours
         silences, alerts = overdue.tick(said.silences, store.known(glider), fleet, hours, now)
         if silences != said.silences:
-            store.say(glider, replace(said, silences=silences), alerts, speaking.channels, now)
+            post_alerts(store, glider, replace(said, silences=silences), alerts, speaking.channels, now)
     return tuple(alerts)
 
 
 def next_tick(store: Store, glider: str, speaking: Speaking, now: float) -> float | None:
     """When `tick` has something to say of a glider next (s), None: never."""
-    attention = store.notes.heeded(glider, speaking.attention(glider))
+    attention = with_mute(speaking.attention(glider), store.notes.muted_until(glider))
     if attention.recovered:
         return None
     at = overdue.next_tick(store.said(glider).silences, store.known(glider), attention.overdue_hours, now)
@@ -149,7 +151,7 @@ def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: 
         return process(state, segment, params, ocean)
     except Exception as error:
         what = f"{type(error).__name__}: {error}"
-        raise Quarantine(f"cannot be assessed, please report it ({segment.id.name}: {what})") from error
+        raise NotAssessed(f"cannot be assessed, please report it ({segment.id.name}: {what})") from error
 
 
 def _speak(
@@ -157,8 +159,9 @@ def _speak(
 ) -> tuple[Alert, ...]:
     if speaking is None:
         return ()
-    if store.notes.heeded(glider, speaking.attention(glider)).is_quiet(now):
-        store.answer(glider, now, quiet=True)
+    attention = with_mute(speaking.attention(glider), store.notes.muted_until(glider))
+    if attention.is_quiet(now):
+        withdraw_answered(store, glider, now, quiet=True)
         return ()
     before, known = store.said(glider), store.known(glider)
     silences, heard = overdue.hear(before.silences, known, now)
@@ -169,7 +172,8 @@ def _speak(
         speaking.notices(glider),
         store.notes.acks(glider),
     )
-    alerts = [*heard, *alerts]
+    blind, more = unknown.announce(said.unknown, known, attention, params.rules.reminder_hours, now)
+    said, alerts = replace(said, unknown=blind), [*heard, *alerts, *more]
     if said != before or alerts:
-        store.say(glider, said, alerts, speaking.channels, now)
+        post_alerts(store, glider, said, alerts, speaking.channels, now)
     return tuple(alerts)

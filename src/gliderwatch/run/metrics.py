@@ -16,15 +16,15 @@ import structlog
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info, start_http_server
 
 from gliderwatch import __version__
+from gliderwatch.alerts.outbox import Delivery
 from gliderwatch.config import Config
 from gliderwatch.config.service import Metrics as Settings
 from gliderwatch.model import Assessment
 from gliderwatch.rules.overdue import RECENT
 from gliderwatch.rules.silence import GONE, awaited
 from gliderwatch.run.life import STALE
-from gliderwatch.run.operator import last_files, reading
-from gliderwatch.store.outbox import released
 from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.store.watch_health import last_files, outbox_since
 
 log = structlog.get_logger(__name__)
 
@@ -173,32 +173,22 @@ class Outbox:
         delays: list[tuple[str, float]] = []
         failed: list[tuple[str, int]] = []
         waiting: dict[str, int] = {}
-        rows = self._rows()
+        rows = outbox_since(self._state, self._from)
         for row in rows:
-            number, channel, attempts, delivered_at, due, error = row
-            if more := attempts - self._attempts.get(number, 0):
-                failed.append((channel, more))
-                self._attempts[number] = attempts
-            if delivered_at is None:
-                waiting[channel] = waiting.get(channel, 0) + (due <= now)
-            elif number not in self._delivered:
-                self._delivered.add(number)
-                if not error:
-                    delays.append((channel, max(0.0, delivered_at - due)))
-        self._move_on([row[0] for row in rows if row[3] is None], rows)
+            if more := row.attempts - self._attempts.get(row.id, 0):
+                failed.append((row.channel, more))
+                self._attempts[row.id] = row.attempts
+            if row.delivered_at is None:
+                waiting[row.channel] = waiting.get(row.channel, 0) + (row.due <= now)
+            elif row.id not in self._delivered:
+                self._delivered.add(row.id)
+                if row.delivery == Delivery.DELIVERED:
+                    delays.append((row.channel, max(0.0, row.delivered_at - row.due)))
+        self._move_on([row.id for row in rows if row.delivered_at is None], [row.id for row in rows])
         return delays, failed, waiting
 
-    def _rows(self) -> list[Any]:
-        with reading(self._state) as db:
-            sql = (
-                "SELECT o.id, o.channel, o.attempts, o.delivered_at, "
-                f"max(a.made_at, {released(db)}), o.error "
-                "FROM outbox o JOIN alerts a ON a.id = o.alert WHERE o.id > ? ORDER BY o.id"
-            )
-            return list(db.execute(sql, (self._from,)))
-
-    def _move_on(self, waiting: list[int], rows: list[Any]) -> None:
+    def _move_on(self, waiting: list[int], numbers: list[int]) -> None:
         """Look no more at the rows before the first that waits."""
-        self._from = waiting[0] - 1 if waiting else (rows[-1][0] if rows else self._from)
+        self._from = waiting[0] - 1 if waiting else (numbers[-1] if numbers else self._from)
         self._attempts = {n: a for n, a in self._attempts.items() if n > self._from}
         self._delivered = {n for n in self._delivered if n > self._from}

@@ -6,47 +6,50 @@ What is open is read back from the messages in the state file, so that a restart
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from gliderwatch.alerts import message
-from gliderwatch.alerts.smtp import PARTLY
 from gliderwatch.alerts.words import duration, utc
 from gliderwatch.config import Config
 from gliderwatch.config.service import Operator as Settings
 from gliderwatch.model import Alert, Severity
+from gliderwatch.rules.muting import with_mute
+from gliderwatch.rules.overdue import outlook
+from gliderwatch.rules.silence import GONE
+from gliderwatch.run.posting import post_alert
 from gliderwatch.run.speaking import Waits, waits
-from gliderwatch.store.database import guarded, read_only
-from gliderwatch.store.outbox import REFUSED, released
 from gliderwatch.store.sqlite import Store
+from gliderwatch.store.watch_health import (
+    Failing,
+    Waiting,
+    failing,
+    last_files,
+    operator_messages,
+    quarantined,
+    waiting,
+)
 
 DAY, HOUR = 86400.0, 3600.0
-SILENCE, QUARANTINE, DISK, CHANNEL = "silence", "quarantine", "disk", "channel"
+SILENCE, QUARANTINE, WAITING, DISK, CHANNEL = "silence", "quarantine", "waiting", "disk", "channel"
 _ROOT, _OVER = "operator/", "/over"
-
-
-@dataclass(frozen=True, slots=True)
-class Failing:
-    """A channel with messages that it did not take: the oldest was to go out ``since`` (s)."""
-
-    since: float
-    messages: int
-    error: str
 
 
 @dataclass(frozen=True, slots=True)
 class Vitals:
     """How the watch itself is.
 
-    ``silent`` for so long no file came (s; None: no glider is at sea), ``quarantined`` files in the last
-    24 h, ``failing`` channels by name, ``free`` space for the state (MB; None: not known).
+    ``silent`` for so long no file came (s; None: no glider is at sea), and of each glider that is ``missed``
+    while others call. By glider ("" where the header does not say): files ``quarantined`` in the last 24 h,
+    and files that are ``waiting``. ``failing`` channels by name, ``free`` space for the state (MB; None: not
+    known).
     """
 
     silent: float | None = None
-    quarantined: int = 0
+    missed: Mapping[str, float] = field(default_factory=dict)
+    quarantined: Mapping[str, int] = field(default_factory=dict)
+    waiting: Mapping[str, Waiting] = field(default_factory=dict)
     failing: Mapping[str, Failing] = field(default_factory=dict)
     free: float | None = None
 
@@ -62,20 +65,9 @@ class Trouble:
 def troubles(vitals: Vitals, limits: Settings, open_: Iterable[str], now: float) -> dict[str, Trouble]:
     """What is wrong at `now` (s), by key. What is `open_` ends only well within its limit, so that it does
     not come and go."""
-    found, going_on = {}, set(open_)
-    hours, quarantined, free = limits.silent_hours, limits.quarantined_per_day, limits.free_mb
-    if hours is not None and vitals.silent is not None and vitals.silent > hours * HOUR:
-        found[SILENCE] = Trouble(
-            f"no file of any glider for {duration(vitals.silent)}",
-            f"The last one came {utc(now - vitals.silent)}. Check the dockserver, its modems and telephone "
-            "lines, and the share that its folders are on.\nUntil then no glider is watched.",
-        )
-    if quarantined is not None and vitals.quarantined > quarantined / (2 if QUARANTINE in going_on else 1):
-        found[QUARANTINE] = Trouble(
-            f"{vitals.quarantined} files quarantined in 24 h",
-            "They cannot be used as they are. `gliderwatch status` names them with the reason. Many at "
-            "once mean a damaged disk, a transfer that cuts files, or a folder that is no glider's.",
-        )
+    going_on = set(open_)
+    found = _silences(vitals, limits, now) | _files(vitals, limits, going_on, now)
+    free = limits.free_mb
     if free is not None and vitals.free is not None and vitals.free < free * (1.2 if DISK in going_on else 1):
         found[DISK] = Trouble(
             f"only {vitals.free:.0f} MB free for the state file",
@@ -93,12 +85,62 @@ def troubles(vitals: Vitals, limits: Settings, open_: Iterable[str], now: float)
     return found
 
 
+def _silences(vitals: Vitals, limits: Settings, now: float) -> dict[str, Trouble]:
+    """That no file comes, of any glider or of one."""
+    hours = limits.silent_hours
+    if hours is None or vitals.silent is None:
+        return {}
+    if vitals.silent > hours * HOUR:
+        title = f"no file of any glider for {duration(vitals.silent)}"
+        text = (
+            f"The last one came {utc(now - vitals.silent)}. Check the dockserver, its modems and telephone "
+        )
+        text += "lines, and the share that its folders are on.\nUntil then no glider is watched."
+        return {SILENCE: Trouble(title, text)}
+    return {
+        f"{SILENCE}/{glider}": Trouble(
+            f"no file of {glider} for {duration(silent)}",
+            f"The last one came {utc(now - silent)}; other gliders call. Check its folder on the dockserver. "
+            "If it is out of the water, say so: `recovered: true`, or `gliderwatch mute`.",
+        )
+        for glider, silent in vitals.missed.items()
+        if silent > hours * HOUR
+    }
+
+
+def _files(vitals: Vitals, limits: Settings, going_on: set[str], now: float) -> dict[str, Trouble]:
+    """That files of a glider come and are not taken."""
+    found, most, hours = {}, limits.quarantined_per_day, limits.waiting_hours
+    for glider, count in vitals.quarantined.items():
+        key = _key(QUARANTINE, glider)
+        if most is not None and count > most / (2 if key in going_on else 1):
+            found[key] = Trouble(
+                f"{count} files of {glider or 'no known glider'} quarantined in 24 h",
+                "They cannot be used as they are. `gliderwatch status` names them with the reason. Many at "
+                "once mean a damaged disk, a transfer that cuts files, or a folder that is no glider's.",
+            )
+    for glider, files in vitals.waiting.items():
+        late = now - files.since
+        if hours is not None and late > hours * HOUR:
+            found[_key(WAITING, glider)] = Trouble(
+                f"files of {glider or 'no known glider'} have waited for {duration(late)}",
+                f"{files.files} wait; the oldest since {utc(files.since)}: {files.reason}.\nThey are "
+                "taken once that is mended. `gliderwatch status` names them all.",
+            )
+    return found
+
+
+def _key(kind: str, glider: str) -> str:
+    return f"{kind}/{glider}" if glider else kind
+
+
 def over(key: str) -> str:
     """That a trouble is over, in words."""
     kind, _, name = key.partition("/")
     return {
-        SILENCE: "files come again",
-        QUARANTINE: "hardly any files are quarantined any more",
+        SILENCE: f"files of {name} come again" if name else "files come again",
+        QUARANTINE: f"hardly any files{f' of {name}' if name else ''} are quarantined any more",
+        WAITING: f"no files{f' of {name}' if name else ''} wait any more",
         DISK: "there is room on the disk again",
         CHANNEL: f"channel {name} does not fail any more",
     }[kind]
@@ -116,51 +158,9 @@ def channels(config: Config, audience: Severity, key: str) -> Waits:
     return {name: wait for name, wait in found.items() if key != f"{CHANNEL}/{name}"}
 
 
-@contextmanager
-def reading(state: Path) -> Iterator[Any]:
-    """A connection to look with. Raises StateError where the state file cannot be used."""
-    with guarded(state), closing(read_only(state)) as db:
-        yield db
-
-
-def failing(state: Path, now: float) -> dict[str, Failing]:
-    """Channels that failed to take a message that still waits, or that refused one for good in the day before
-    `now` (s) and have delivered none since. What is held does not wait before it is due, and a message that
-    some of a channel's addresses took has been told: the report of the refusal names the others."""
-    with reading(state) as db:
-        since = f"max(a.made_at, {released(db)})"
-        sql = (
-            "SELECT channel, min(since), count(*), error FROM ("
-            f"SELECT o.channel, {since} AS since, o.error FROM outbox o JOIN alerts a ON a.id = o.alert "
-            "WHERE o.delivered_at IS NULL AND o.attempts > 0 UNION ALL "
-            f"SELECT o.channel, {since} AS since, o.error FROM outbox o JOIN alerts a ON a.id = o.alert "
-            "WHERE o.delivered_at > ?1 AND o.error LIKE ?2 || '%' AND o.error NOT LIKE ?2 || ?3 || '%' "
-            "AND NOT EXISTS (SELECT 1 FROM outbox l WHERE l.delivered_at > o.delivered_at "
-            "AND l.channel = o.channel AND l.error = '')) GROUP BY channel"
-        )
-        return {row[0]: Failing(*row[1:]) for row in db.execute(sql, (now - DAY, REFUSED, PARTLY))}
-
-
-def quarantined(state: Path, since: float) -> int:
-    """How many files were quarantined since a time (s)."""
-    sql = "SELECT count(*) FROM files WHERE status = 'quarantined' AND noted_at > ?"
-    with reading(state) as db:
-        return int(db.execute(sql, (since,)).fetchone()[0])
-
-
-def last_files(state: Path, gliders: Iterable[str]) -> dict[str, float]:
-    """When the newest file of each glider came (s)."""
-    sql = "SELECT at FROM heard WHERE glider = ? ORDER BY opened_at DESC LIMIT 1"
-    with reading(state) as db:
-        found = {glider: db.execute(sql, (glider,)).fetchone() for glider in gliders}
-    return {glider: row[0] for glider, row in found.items() if row is not None}
-
-
 def told(state: Path) -> dict[str, tuple[str, float]]:
     """Troubles that were told and are not over: by key the id of the message and its time (s)."""
-    sql = "SELECT id, time FROM alerts WHERE glider = '' AND id >= ? AND id < ? ORDER BY rowid"
-    with reading(state) as db:
-        rows = {row[0]: row[1] for row in db.execute(sql, (_ROOT, _ROOT[:-1] + "0"))}
+    rows = operator_messages(state, _ROOT)
     ids = [identity for identity in rows if not identity.endswith(_OVER) and identity + _OVER not in rows]
     return {i.removeprefix(_ROOT).rpartition("/")[0]: (i, rows[i]) for i in ids}
 
@@ -174,23 +174,40 @@ class Operator:
     def __init__(self, store: Store, state: Path, config: Config, now: float, monotonic: float) -> None:
         self._store, self._state = store, state
         self._open = told(state)
-        last = max(last_files(state, config.gliders).values(), default=now)
-        self._heard = monotonic - max(0.0, now - last)
+        last = last_files(state, config.gliders)
+        self._heard = {glider: monotonic - max(0.0, now - at) for glider, at in last.items()}
+        self._any = max(self._heard.values(), default=monotonic)
 
-    def came(self, monotonic: float) -> None:
-        """A file came."""
-        self._heard = monotonic
+    def came(self, glider: str, monotonic: float) -> None:
+        """A file of a glider came; of none ("") where its header does not say."""
+        self._heard[glider] = self._any = monotonic
 
     def vitals(self, config: Config, now: float, monotonic: float) -> Vitals:
         """How the watch is now."""
-        at_sea = any(not glider.recovered for glider in config.gliders.values())
-        waiting = {name: f for name, f in failing(self._state, now).items() if name in config.channels}
+        watched = {name for name, glider in config.gliders.items() if not glider.recovered}
+        late = {name: f for name, f in failing(self._state, now).items() if name in config.channels}
+        held = {name: w for name, w in waiting(self._state).items() if not name or name in watched}
         return Vitals(
-            monotonic - self._heard if at_sea else None,
+            monotonic - self._any if watched else None,
+            self._missed(config, watched, now, monotonic),
             quarantined(self._state, now - DAY),
-            waiting,
+            held,
+            late,
             _free(self._state.parent),
         )
+
+    def _missed(self, config: Config, watched: set[str], now: float, monotonic: float) -> dict[str, float]:
+        """For how long (s) no file came of gliders in the water, where that is no usual pause."""
+        missed = {}
+        for name in sorted(watched & self._heard.keys()):
+            silent = monotonic - self._heard[name]
+            if silent < (config.operator.silent_hours or 0.0) * HOUR or silent > GONE:
+                continue  # the look into the state is for the few that are silent
+            attention = with_mute(config.attention(name), self._store.notes.muted_until(name))
+            found = None if attention.is_quiet(now) else outlook(self._store.known(name), now)
+            if found is not None and silent > 2 * (found[0].t - found[0].after):
+                missed[name] = silent
+        return missed
 
     def look(self, config: Config, limits: Settings, now: float, monotonic: float) -> tuple[Alert, ...]:
         """Messages about what went wrong, and about what is well again; they are in the outbox then."""
@@ -201,7 +218,7 @@ class Operator:
         if alerts:
             with self._store.transaction():
                 for key, alert in alerts.items():
-                    self._store.post(alert, channels(config, alert.audience, key), now)
+                    post_alert(self._store, alert, channels(config, alert.audience, key), now)
         self._open |= {key: (alert.id, now) for key, alert in began.items()}
         for key in ended:
             del self._open[key]

@@ -13,6 +13,7 @@ from gliderwatch.alerts import message
 from gliderwatch.config import Config
 from gliderwatch.errors import DamagedError
 from gliderwatch.model import Alert, Severity
+from gliderwatch.rules.waiting import NO_INCIDENT, deliveries
 from gliderwatch.run import logs, operator
 from gliderwatch.store import damage
 from gliderwatch.store.sqlite import Store
@@ -66,7 +67,8 @@ def _tell(aside: Path, config: Config) -> None:
             audience=Severity.WARNING,
         )
 
-    channels = operator.channels(config, Severity.WARNING, "state")
+    waits = operator.channels(config, Severity.WARNING, "state")
+    channels = deliveries(report(0), waits, now, lambda channel: NO_INCIDENT)
     alert = damage.restore(Path(config.state.path), aside, report, channels)
     if alert is not None:
         logs.alerts([alert])

@@ -15,10 +15,11 @@ from pathlib import Path
 from gliderwatch.alerts.channels import Channel
 from gliderwatch.alerts.outbox import Dispatcher
 from gliderwatch.config import Config, expand
-from gliderwatch.errors import GliderwatchError, Quarantine, Retry
+from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine, Retry
 from gliderwatch.ingest import names
 from gliderwatch.ingest.decode import Decoder
-from gliderwatch.model import Alert, Segment
+from gliderwatch.ingest.header import read_header
+from gliderwatch.model import Alert, Hindrance, Segment
 from gliderwatch.params import GliderParams
 from gliderwatch.rules.silence import GONE
 from gliderwatch.run import arrivals, intake
@@ -202,6 +203,9 @@ def _triage(
         found = arrivals.judge(path, report.store, caches, request.is_wanted)
         if isinstance(found, Job):
             jobs.append(found)
+        elif found is not None and found.hindrance is Hindrance.NO_CACHE:
+            # a sign of life of its time: it has its turn with the others
+            jobs.append(Job(found, read_header(path), MissingCache(found.crc, caches)))
         elif found is not None:
             if found.status == Status.UNKNOWN and request.glider is not None:
                 found = replace(found, reason=f"of {found.glider}, not of {request.glider}")
@@ -212,16 +216,17 @@ def _triage(
 def _check_glider(request: Request, jobs: Sequence[Job], store: Store) -> None:
     """Raises GliderwatchError where the glider asked for has no files, but others have."""
     others = sorted({file.glider for file in store.files(Status.UNKNOWN)})
-    asked = {job.header.id.glider for job in jobs} | {f.glider for f in store.files(Status.WAITING)}
+    asked = {job.header.id.glider for job in jobs}
     if request.glider is not None and others and request.glider not in asked:
         raise GliderwatchError(f"no files of glider {request.glider}, but of: {', '.join(others)}")
 
 
 def _decoded(jobs: Sequence[Job], caches: Sequence[Path], workers: int) -> Iterator[Job]:
     with Decoder(caches, max_workers=workers) as decoder:
-        results = decoder.map([Path(job.file.path) for job in jobs])
-        for job, (_, result) in zip(jobs, results, strict=True):
-            job.result = result
+        results = decoder.map([Path(job.file.path) for job in jobs if job.result is None])
+        for job in jobs:
+            if job.result is None:
+                job.result = next(results)[1]
             yield job
 
 

@@ -11,6 +11,7 @@ from gliderwatch.config import Config
 from gliderwatch.model import Assessment, Expected, Incident
 from gliderwatch.params import Attention
 from gliderwatch.rules.acknowledged import Acks
+from gliderwatch.rules.muting import with_mute
 from gliderwatch.rules.overdue import RECENT
 from gliderwatch.rules.silence import GONE, Awaited, awaited, guess, is_launched
 from gliderwatch.run.life import STALE, is_held, silence
@@ -118,7 +119,7 @@ def _glider(store: Store, name: str, config: Config, now: float) -> GliderStatus
     known = store.known(name)
     latest = known.last_surfacing(float("inf"))
     incidents = tuple(i for i in store.incidents(name) if i.cleared_at is None)
-    attention = store.notes.heeded(name, config.attention(name))
+    attention = with_mute(config.attention(name), store.notes.muted_until(name))
     signs, acks = known.signs(now - RECENT), store.notes.acks(name)
     expected = known.expected(now)
     if expected is None and is_launched(signs, known.has_dived(now - RECENT)):

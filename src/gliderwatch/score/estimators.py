@@ -14,7 +14,7 @@ from gliderwatch.config.document import read
 from gliderwatch.config.loading import presets_path
 from gliderwatch.errors import GliderwatchError
 
-ALGORITHMS = ("joint", "composite", "adaptive")
+ALGORITHMS = ("joint", "adaptive")
 """The values of `estimator:`, the default first."""
 
 

@@ -66,9 +66,9 @@ def own_speeds(dives: Sequence[Dive]) -> dict[float, float]:
     """By start of dive (s), the speed (m/s) that the glider's own reckoning had, where it can be known."""
     found = {}
     for dive in dives:
-        speed = closure(dive.track, dive.current).get("along_speed") if dive.track and dive.current else None
-        if speed is not None and 0.0 < speed < 1.5:
-            found[dive.t_dive] = speed
+        closed = closure(dive.track, dive.current) if dive.track and dive.current else None
+        if closed is not None and 0.0 < closed.along_speed < 1.5:
+            found[dive.t_dive] = closed.along_speed
     return found
 
 

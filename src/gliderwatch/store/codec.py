@@ -3,6 +3,7 @@
 A record is zlib-compressed UTF-8 JSON of ``{"v": version, "data": ...}``. Values are objects with
 the fields of their dataclass; an array is ``{"shape": [...], "f64": "..."}`` with its little-endian
 float64 bytes in base64, so that every bit comes back. `docs/state-file.md` shows how to look into one.
+A record of an earlier layout is converted when it is read (`conversion`).
 """
 
 from __future__ import annotations
@@ -14,18 +15,11 @@ from typing import Any, TypeVar
 import msgspec
 import numpy as np
 
-from gliderwatch.errors import DamagedError, GliderwatchError
+from gliderwatch.errors import DamagedError, LayoutError, StateError
 from gliderwatch.model import readonly
-
-VERSION = 1
-"""Of the layout of checkpoints and segments. A change of a field of any value in them raises it, and
-`decode` then has to know the older ones."""
+from gliderwatch.store import conversion
 
 T = TypeVar("T")
-
-
-class UnknownVersionError(GliderwatchError):
-    """A record was written by a newer gliderwatch."""
 
 
 class _Record(msgspec.Struct):
@@ -36,21 +30,32 @@ class _Record(msgspec.Struct):
 def encode(value: object) -> bytes:
     """A record of any of the values of gliderwatch."""
     data = msgspec.json.encode(value, enc_hook=_from_array)
-    return zlib.compress(msgspec.json.encode(_Record(VERSION, msgspec.Raw(data))), 1)
+    version = conversion.version(type(value))
+    return zlib.compress(msgspec.json.encode(_Record(version, msgspec.Raw(data))), 1)
 
 
 def decode(record: bytes, kind: type[T]) -> T:
-    """The value of a record. Raises UnknownVersionError, or DamagedError where it is no such value."""
+    """The value of a record, converted where its layout is an earlier one.
+
+    Raises DamagedError where its bytes are broken, LayoutError where they are whole but make no such value.
+    """
     try:
         parsed = msgspec.json.decode(zlib.decompress(record), type=_Record)
     except (zlib.error, msgspec.MsgspecError, UnicodeError) as error:
-        raise _damaged(error) from error
-    if parsed.v != VERSION:
-        raise UnknownVersionError(
-            f"the state file holds records of version {parsed.v}, this gliderwatch knows {VERSION}: "
+        raise _unreadable(error, kind) from error
+    today = conversion.version(kind)
+    if not 1 <= parsed.v <= today:
+        raise LayoutError(
+            f"the state file holds a {kind.__name__} of layout {parsed.v}, this gliderwatch knows {today}: "
             "install the gliderwatch that wrote it, or a newer one"
         )
-    return plain_decode(parsed.data, kind)
+    if parsed.v == today:
+        return plain_decode(parsed.data, kind)
+    try:
+        data = conversion.converted(msgspec.json.decode(parsed.data), kind, parsed.v)
+    except (LookupError, TypeError, ValueError, AttributeError) as error:  # not of the layout that it says
+        raise _unreadable(error, kind) from error
+    return plain_decode(msgspec.json.encode(data), kind)
 
 
 def plain_encode(value: object) -> str:
@@ -59,15 +64,27 @@ def plain_encode(value: object) -> str:
 
 
 def plain_decode(text: str | bytes | msgspec.Raw, kind: type[T]) -> T:
-    """The value of such a text. Raises DamagedError where it is none."""
+    """The value of such a text. Raises DamagedError or LayoutError, as `decode`."""
     try:
         return msgspec.json.decode(text, type=kind, dec_hook=_to_array)
     except (msgspec.MsgspecError, UnicodeError) as error:
-        raise _damaged(error) from error
+        raise _unreadable(error, kind) from error
 
 
-def _damaged(error: Exception) -> DamagedError:
-    return DamagedError(f"a record of the state file is damaged: {error}")
+def _unreadable(error: Exception, kind: type) -> StateError:
+    """Broken bytes are the disk's doing: to be set aside. Whole JSON of another type is the program's.
+
+    msgspec.ValidationError is a DecodeError of JSON that is well-formed.
+    """
+    if isinstance(error, zlib.error | UnicodeError) or (
+        isinstance(error, msgspec.DecodeError) and not isinstance(error, msgspec.ValidationError)
+    ):
+        return DamagedError(f"a record of the state file is damaged: {error}")
+    return LayoutError(
+        f"the state file holds a {getattr(kind, '__name__', kind)} that this gliderwatch cannot read: "
+        f"{type(error).__name__}: {error}. Nothing of it is lost. What to do: install the gliderwatch that "
+        "wrote it, start it again, and report this"
+    )
 
 
 def _from_array(value: Any) -> Any:
@@ -82,5 +99,9 @@ def _from_array(value: Any) -> Any:
 
 
 def _to_array(kind: Any, value: Any) -> Any:
-    raw = np.frombuffer(base64.b64decode(value["f64"]), dtype="<f8")
-    return readonly(raw.reshape(value["shape"]))
+    """Raises TypeError or ValueError, of which msgspec makes a ValidationError."""
+    try:
+        raw = np.frombuffer(base64.b64decode(value["f64"]), dtype="<f8")
+        return readonly(raw.reshape(value["shape"]))
+    except KeyError as error:
+        raise ValueError(f"an array without {error}") from None

@@ -17,7 +17,7 @@ from gliderwatch.errors import GliderwatchError, StateError
 from gliderwatch.model import Alert
 from gliderwatch.rules.announce import Said
 from gliderwatch.store import codec
-from gliderwatch.store.database import DAMAGE, connect, guarded, primary
+from gliderwatch.store.database import DAMAGE, DELIVERY_BY_WORDS, connect, guarded, primary
 from gliderwatch.store.outbox import post
 
 LOOK = 1.0
@@ -124,11 +124,16 @@ def _save(aside: Path, db: sqlite3.Connection) -> int:
                 _put(db, "INSERT OR IGNORE INTO alerts VALUES (?, ?, ?, ?, ?)", row)
                 kept.add(row[0])
         columns = "alert, channel, incident, attempts, next_try, delivered_at, error"
-        for wait in (", held_until, escalates", ""):  # of an earlier release it has no such columns
+        # of an earlier release it has not all columns
+        for wait in (", held_until, escalates, delivery", ", held_until, escalates", ""):
             for row in _rows(damaged, f"SELECT {columns}{wait} FROM outbox ORDER BY id"):
                 if row[0] in kept:
                     marks = ", ".join("?" * len(row))
                     _put(db, f"INSERT OR IGNORE INTO outbox ({columns}{wait}) VALUES ({marks})", row)
+        db.execute(
+            f"UPDATE outbox SET delivery = {DELIVERY_BY_WORDS} "
+            "WHERE delivery = 'pending' AND delivered_at IS NOT NULL"
+        )
     return len(kept)
 
 

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from importlib.resources import files
 from pathlib import Path
 
+import msgspec
+
 from gliderwatch.errors import DamagedError, StateError
+from gliderwatch.store import conversion
 
 __all__ = ["MEMORY", "SCHEMA", "StateError", "connect", "guarded", "read_only", "schema"]
 
-SCHEMA = 4
+SCHEMA = 5
+DELIVERY_BY_WORDS = """CASE
+    WHEN delivered_at IS NULL THEN 'pending' WHEN error = '' THEN 'delivered'
+    WHEN error LIKE 'withdrawn: %' THEN 'withdrawn' WHEN error LIKE 'given up: %' THEN 'unreadable'
+    WHEN error LIKE 'refused: only some took it: %' THEN 'partly_refused' ELSE 'refused' END"""
+"""SQL: how it stands with a row of the outbox of schema 4 or before, which said it in words alone."""
 MIGRATIONS: dict[int, str] = {
     2: """
 CREATE TABLE expected (           -- the next surfacing, as expected after each segment
@@ -54,9 +62,23 @@ ALTER TABLE outbox ADD COLUMN held_until REAL NOT NULL DEFAULT 0;     -- not sen
 ALTER TABLE outbox ADD COLUMN escalates REAL NOT NULL DEFAULT 9e999;  -- while nobody acknowledges, sent then
 CREATE INDEX outbox_by_delivery ON outbox (delivered_at);
 """,
+    5: f"""
+ALTER TABLE outbox ADD COLUMN delivery TEXT NOT NULL DEFAULT 'pending';  -- `alerts.worker.Delivery`
+UPDATE outbox SET delivery = {DELIVERY_BY_WORDS};
+ALTER TABLE files ADD COLUMN hindrance TEXT NOT NULL DEFAULT '';  -- why it is not taken: `model.Hindrance`
+UPDATE files SET hindrance = CASE WHEN status = 'duplicate' AND reason = 'was renamed' THEN 'renamed'
+    WHEN status = 'waiting' AND crc != '' THEN 'no_cache'
+    WHEN status = 'waiting' AND reason LIKE 'is not there any more%' THEN 'gone'
+    WHEN status = 'waiting' THEN 'unreadable'
+    WHEN status = 'quarantined' AND reason LIKE 'cannot be assessed%' THEN 'not_assessed'
+    WHEN status = 'quarantined' THEN 'damaged' ELSE '' END;
+CREATE INDEX files_by_segment ON files (glider, segment);
+""",
 }
-"""SQL that leads from the schema before to the one of the key. A state file is never written by an older
-gliderwatch than the one that migrated it."""
+"""SQL that leads from the schema before to the one of the key. It may call the functions of
+`conversion.ROW_CONVERTERS`. Only the 2nd sets checkpoints to NULL: nothing before it had `state.keep_days`,
+so all could be made again. A state file is never written by an older gliderwatch than the one that migrated
+it."""
 MEMORY = ":memory:"
 DAMAGE = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
 """Codes of SQLite for a file whose content makes no sense."""
@@ -166,10 +188,17 @@ def _migrate(connection: sqlite3.Connection, path: Path | str) -> None:
         return
     steps = [] if version else [schema()]
     steps += [MIGRATIONS[v] for v in range(max(version, 1) + 1, SCHEMA + 1)]
+    for name, convert in conversion.ROW_CONVERTERS.items():
+        connection.create_function(name, 1, _on_text(convert), deterministic=True)
     with closing(connection.cursor()) as cursor:
         cursor.executescript(
             "BEGIN IMMEDIATE;\n" + "\n".join(steps) + f"\nPRAGMA user_version = {SCHEMA};\nCOMMIT;"
         )
+
+
+def _on_text(convert: conversion.Converter) -> Callable[[str], str]:
+    """A converter as a function of SQL: from JSON text to JSON text."""
+    return lambda text: msgspec.json.encode(convert(msgspec.json.decode(text))).decode()
 
 
 def schema() -> str:

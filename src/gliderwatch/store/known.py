@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Iterator
 
-from gliderwatch.model import Assessment, Expected, Incident
+from gliderwatch.alerts.unknown import Unjudged
+from gliderwatch.model import Assessment, Expected, Hindrance, Incident, Unusable
 from gliderwatch.rules.silence import Sign
 from gliderwatch.store.rows import values
 
 
 class Known:
-    """`rules.announce.Known` and `rules.overdue.Known` of one glider, on the connection of its store."""
+    """What `rules` asks of one glider (each `Known` there), on the connection of its store."""
 
     def __init__(self, connection: sqlite3.Connection, glider: str) -> None:
         self._db, self.glider = connection, glider
@@ -58,7 +60,49 @@ class Known:
         )
         return bool(self._db.execute(sql, (self.glider, since)).fetchone()[0])
 
+    def judged(self, until: float) -> float | None:
+        """The last surfacing (s) at `until` (s) or before whose dive has a flag."""
+        sql = (
+            "SELECT t_surface FROM assessments WHERE glider = ? AND ended = 1 AND t_surface <= ? "
+            "AND flag IS NOT NULL ORDER BY t_surface DESC LIMIT 1"
+        )
+        row = self._db.execute(sql, (self.glider, until)).fetchone()
+        return None if row is None else float(row[0])
+
+    def unjudged(self, since: float) -> tuple[Unjudged, ...]:
+        """Dives without a flag, and files that were not taken, that began later than `since` (s)."""
+        sql = (
+            "SELECT data FROM assessments WHERE glider = ? AND t_dive > ? AND flag IS NULL "
+            "AND (ended = 1 OR json_extract(data, '$.n_samples') > 2)"
+        )
+        dives = values(self._db, sql, (self.glider, since), Assessment)
+        return (*map(_of_dive, dives), *self._not_taken(since), *self._empty(since))
+
+    def _not_taken(self, since: float) -> Iterator[Unjudged]:
+        """Segments of which a file came, but none that could be taken."""
+        sql = (
+            "SELECT h.opened_at, h.at, f.hindrance, f.reason, f.crc FROM heard h "
+            "JOIN files f ON f.glider = h.glider AND f.segment = h.segment "
+            "WHERE h.glider = ?1 AND h.opened_at > ?2 AND f.status IN ('waiting', 'quarantined') "
+            "AND f.hindrance != 'gone' AND NOT EXISTS "
+            "(SELECT 1 FROM segments s WHERE s.glider = h.glider AND s.name = h.segment) "
+            "GROUP BY h.segment"
+        )
+        for row in self._db.execute(sql, (self.glider, since)):
+            cause = Hindrance(row[2]) if row[2] else None
+            yield Unjudged(row[0], row[1], cause, row[3], row[4])
+
+    def _empty(self, since: float) -> Iterator[Unjudged]:
+        """Segments of which a file was taken that holds nothing."""
+        sql = "SELECT opened_at, at FROM heard WHERE glider = ? AND opened_at > ? AND last_t <= opened_at"
+        for row in self._db.execute(sql, (self.glider, since)):
+            yield Unjudged(row[0], row[1], Unusable.DATA_MISSING, "its file holds no data")
+
     def signs(self, since: float) -> tuple[Sign, ...]:
         """Its files that were opened at `since` (s) or later."""
         sql = "SELECT opened_at, last_t, at FROM heard WHERE glider = ? AND opened_at >= ?"
         return tuple(Sign(*row) for row in self._db.execute(sql, (self.glider, since)))
+
+
+def _of_dive(dive: Assessment) -> Unjudged:
+    return Unjudged(dive.t_dive, dive.t_surface, dive.unusable, dive.reason)

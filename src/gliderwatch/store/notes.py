@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from dataclasses import replace
 
-from gliderwatch.params import Attention
 from gliderwatch.rules.acknowledged import Ack, Acks
 from gliderwatch.store import codec
 
@@ -15,13 +13,6 @@ class Notes:
 
     def __init__(self, connection: sqlite3.Connection) -> None:
         self._db = connection
-
-    def heeded(self, glider: str, configured: Attention) -> Attention:
-        """How a glider is taken: of the mute configured and the one told by command the later counts."""
-        until = self.muted_until(glider)
-        if until is None or (configured.muted_until is not None and configured.muted_until >= until):
-            return configured
-        return replace(configured, muted_until=until)
 
     def muted_until(self, glider: str) -> float | None:
         """Until when (s) a glider is muted by command; None: it is not."""

@@ -1,8 +1,8 @@
 """The outbox table as the dispatcher sees it.
 
-A row is done with once ``delivered_at`` is set. Where ``error`` is not empty then, it was not delivered but
+A row is done with once ``delivered_at`` is set. ``delivery`` says how (`alerts.worker.Delivery`): delivered,
 given up (the channel refused it for good, or it cannot be read any more) or withdrawn, because somebody had
-acknowledged its incident before it was due.
+acknowledged its incident before it was due. ``error`` says why in words, for people.
 
 A row is held until ``held_until``, or until ``escalates`` while nobody has acknowledged its incident,
 whichever is first (`rules.waiting`); infinite is never. Within an incident and channel no row is held longer
@@ -16,14 +16,12 @@ import sqlite3
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
-from gliderwatch.alerts.escalation import escalated
-from gliderwatch.alerts.outbox import LONGEST_DELAY, OutboxRow
-from gliderwatch.errors import DamagedError
+from gliderwatch.alerts.outbox import LONGEST_DELAY, Delivery, OutboxRow
+from gliderwatch.errors import DamagedError, LayoutError
 from gliderwatch.model import Alert
-from gliderwatch.rules import waiting
-from gliderwatch.rules.waiting import AT_ONCE, NO_INCIDENT, Standing
+from gliderwatch.rules.waiting import Due
 from gliderwatch.store import codec
-from gliderwatch.store.database import connect
+from gliderwatch.store.database import DELIVERY_BY_WORDS, connect
 from gliderwatch.store.rows import Undelivered
 
 PARKED = math.inf
@@ -35,36 +33,21 @@ FAR = 1e300
 SET_BACK = 60.0
 """Seconds: a clock that is that far before the time when a message was made was set back since. By such a
 clock nothing is held."""
-REFUSED, WITHDRAWN = "refused: ", "withdrawn: "
-"""How the ``error`` of rows begins that a channel refused for good, and of those that were withdrawn."""
 HELD = f"(o.held_until > :now AND o.escalates > :now AND :now >= a.made_at - {SET_BACK})"
 """SQL: whether a row of the outbox ``o`` and its message ``a`` is held at a time `now`."""
 
 
-def post(
-    db: sqlite3.Connection,
-    alert: Alert,
-    channels: Iterable[str],
-    now: float,
-    unanswered: Collection[str] = (),
-) -> None:
+def post(db: sqlite3.Connection, alert: Alert, channels: Iterable[str], now: float) -> None:
     """Keep one message and put it into the outbox of its channels; a known id is left alone.
 
-    A mapping of `channels` tells what the recipients of each wait for; of names alone they get it at once.
-    `unanswered` are the threads that go on and that nobody has taken on.
+    A mapping of `channels` tells when it is due by each (`rules.waiting.Due`); by names alone it is at once.
     """
     db.execute(
         "INSERT OR IGNORE INTO alerts VALUES (?, ?, ?, ?, ?)",
         (alert.id, alert.glider, alert.time, now, codec.plain_encode(alert)),
     )
-    waits = channels if isinstance(channels, Mapping) else dict.fromkeys(channels, AT_ONCE)
-    for channel, wait in waits.items():
-        standing = NO_INCIDENT
-        if alert.incident and any(w.after is not None for w in wait):
-            standing = _standing(db, alert.incident, channel, now, alert.incident in unanswered)
-        due = waiting.due(wait, alert.audience, now, standing)
-        if due is None:
-            continue
+    dues = channels if isinstance(channels, Mapping) else dict.fromkeys(channels, Due(0.0, math.inf))
+    for channel, due in dues.items():
         db.execute(
             "INSERT OR IGNORE INTO outbox (alert, channel, incident, held_until, escalates) "
             "VALUES (?, ?, ?, ?, ?)",
@@ -78,14 +61,16 @@ def post(
         )
 
 
-def _standing(db: sqlite3.Connection, incident: str, channel: str, now: float, unanswered: bool) -> Standing:
+def standing(db: sqlite3.Connection, incident: str, channel: str, now: float) -> tuple[bool, float]:
+    """Whether a message of an incident went out by a channel, or is about to, and when what waits there
+    escalates (s; infinite: nothing waits)."""
     told, escalates = db.execute(
-        f"SELECT coalesce(max(iif(o.delivered_at IS NULL, NOT {HELD}, o.error = '')), 0), "
+        f"SELECT coalesce(max(iif(o.delivered_at IS NULL, NOT {HELD}, o.delivery = 'delivered')), 0), "
         "coalesce(min(iif(o.delivered_at IS NULL, o.escalates, NULL)), 9e999) "
         "FROM outbox o JOIN alerts a ON a.id = o.alert WHERE o.channel = :channel AND o.incident = :incident",
         {"now": now, "channel": channel, "incident": incident},
     ).fetchone()
-    return Standing(bool(told), unanswered, escalates)
+    return bool(told), float(escalates)
 
 
 def withdraw(db: sqlite3.Connection, glider: str, unanswered: Collection[str], now: float) -> None:
@@ -100,8 +85,8 @@ def withdraw(db: sqlite3.Connection, glider: str, unanswered: Collection[str], n
     ).fetchall()
     ids = [row[0] for row in rows if row[1] not in unanswered]
     db.executemany(
-        "UPDATE outbox SET delivered_at = ?, error = ? WHERE id = ? AND held_until = 9e999",
-        [(now, f"{WITHDRAWN}acknowledged, muted or over", n) for n in ids],
+        "UPDATE outbox SET delivered_at = ?, delivery = ?, error = ? WHERE id = ? AND held_until = 9e999",
+        [(now, Delivery.WITHDRAWN, "withdrawn: acknowledged, muted or over", n) for n in ids],
     )
     db.executemany("UPDATE outbox SET escalates = 9e999 WHERE id = ?", [(n,) for n in ids])
 
@@ -111,6 +96,12 @@ def released(db: sqlite3.Connection) -> str:
     migrated yet."""
     known = "SELECT 1 FROM pragma_table_info('outbox') WHERE name = 'escalates'"
     return "min(o.held_until, o.escalates)" if db.execute(known).fetchone() is not None else "0.0"
+
+
+def delivery(db: sqlite3.Connection) -> str:
+    """SQL: how it stands with a row of the innermost outbox, also in a file that is not migrated yet."""
+    known = "SELECT 1 FROM pragma_table_info('outbox') WHERE name = 'delivery'"
+    return "delivery" if db.execute(known).fetchone() is not None else DELIVERY_BY_WORDS
 
 
 def undelivered(db: sqlite3.Connection) -> list[Undelivered]:
@@ -127,9 +118,9 @@ def undelivered(db: sqlite3.Connection) -> list[Undelivered]:
 def refused(db: sqlite3.Connection, since: float) -> list[Undelivered]:
     """What a channel refused for good, or could not be read, since a time (s); oldest first."""
     rows = db.execute(
-        "SELECT alert, channel, attempts, error FROM outbox WHERE delivered_at >= ? AND error != '' "
-        "AND error NOT LIKE ? || '%' ORDER BY id",
-        (since, WITHDRAWN),
+        "SELECT o.alert, o.channel, o.attempts, o.error FROM outbox o WHERE o.delivered_at >= ? "
+        f"AND {delivery(db)} NOT IN ('delivered', 'withdrawn') ORDER BY o.id",
+        (since,),
     )
     return [Undelivered(*row) for row in rows]
 
@@ -144,8 +135,8 @@ class Outbox:
         """Undelivered rows to try now, oldest first, none before an older one of its thread and channel.
 
         A row that cannot be read is given up, so that it keeps no other back. One whose time is farther off
-        than any delay was put off by a clock that has been set back since: it is due. One that goes out
-        because nobody has acknowledged its incident says so.
+        than any delay was put off by a clock that has been set back since: it is due. Of one that goes out
+        because nobody has acknowledged its incident, ``unacknowledged`` is how long that was waited for (s).
         """
         rows = self._db.execute(
             "SELECT o.id, a.data, o.channel, o.attempts, o.held_until > :now AND o.escalates < 9e999, "
@@ -160,18 +151,18 @@ class Outbox:
         for row in rows:
             try:
                 alert = codec.plain_decode(row[1], Alert)
-            except DamagedError as error:
-                self._give_up(row[0], f"given up: {error}", now)
+            except (DamagedError, LayoutError) as error:
+                self._give_up(row[0], Delivery.UNREADABLE, f"given up: {error}", now)
                 continue
-            found.append(OutboxRow(row[0], escalated(alert, row[5]) if row[4] else alert, row[2], row[3]))
+            found.append(OutboxRow(row[0], alert, row[2], row[3], row[5] if row[4] else None))
         return found
 
     def delivered(self, row_id: int, now: float) -> None:
         """Mark a row as delivered, also one that was withdrawn while it was on its way."""
         self._db.execute(
-            "UPDATE outbox SET delivered_at = ?, error = '' "
-            "WHERE id = ? AND (delivered_at IS NULL OR error LIKE ? || '%')",
-            (now, row_id, WITHDRAWN),
+            "UPDATE outbox SET delivered_at = ?, delivery = ?, error = '' "
+            "WHERE id = ? AND (delivered_at IS NULL OR delivery = ?)",
+            (now, Delivery.DELIVERED, row_id, Delivery.WITHDRAWN),
         )
 
     def failed(self, row_id: int, error: str, next_try: float) -> None:
@@ -183,12 +174,18 @@ class Outbox:
         )
 
     def refused(
-        self, row_id: int, error: str, now: float, report: Alert | None, channels: Iterable[str]
+        self,
+        row_id: int,
+        delivery: Delivery,
+        error: str,
+        now: float,
+        report: Alert | None,
+        channels: Iterable[str],
     ) -> None:
         """Give a row up, and put a report of it into the outbox of other channels, both or none."""
         self._db.execute("BEGIN IMMEDIATE")
         try:
-            self._give_up(row_id, f"{REFUSED}{error}", now)
+            self._give_up(row_id, delivery, f"refused: {error}", now)
             if report is not None:
                 post(self._db, report, channels, now)
             self._db.execute("COMMIT")
@@ -215,9 +212,9 @@ class Outbox:
         """Give the connection back."""
         self._db.close()
 
-    def _give_up(self, row_id: int, reason: str, now: float) -> None:
+    def _give_up(self, row_id: int, delivery: Delivery, reason: str, now: float) -> None:
         self._db.execute(
-            "UPDATE outbox SET attempts = attempts + 1, delivered_at = ?, error = ? "
+            "UPDATE outbox SET attempts = attempts + 1, delivered_at = ?, delivery = ?, error = ? "
             "WHERE id = ? AND delivered_at IS NULL",
-            (now, reason, row_id),
+            (now, delivery, reason, row_id),
         )

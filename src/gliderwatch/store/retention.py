@@ -14,18 +14,12 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 
-import structlog
-
 from gliderwatch.model import Incident, SegmentId
 from gliderwatch.pipeline import GliderState
-from gliderwatch.rules.announce import Said, Thread
+from gliderwatch.rules.announce import Said
+from gliderwatch.rules.retained import ended_at, is_removable, kept_since
 from gliderwatch.store import codec
 
-log = structlog.get_logger(__name__)
-
-DAY, HOUR = 86400.0, 3600.0
-STEADY = 60.0
-"""Seconds by which the clock may run apart from the monotonic one between two runs."""
 FIRST = 2
 """`milestone` of a segment before which nothing is kept any more."""
 AT_ONCE = 500
@@ -60,7 +54,7 @@ def remove(
     """
     for glider in gliders:
         incidents, said = _incidents(db, glider), _said(db, glider)
-        before = min(_floor(incidents, said.threads, cut), _came_since(db, glider, cut))
+        before = min(kept_since(incidents, said.threads, cut), _came_since(db, glider, cut))
         yield from _segments(db, transaction, glider, before)
         yield from _results(db, transaction, glider)
     yield from _files(db, transaction, cut)
@@ -87,33 +81,15 @@ def _said(db: sqlite3.Connection, glider: str) -> Said:
     return codec.plain_decode(row[0], Said) if row is not None else Said()
 
 
-def _floor(incidents: Iterable[Incident], threads: Iterable[Thread], cut: float) -> float:
-    """The time (s), at the most `cut`, from which on all is kept for incidents that are not over at `cut`."""
-    over = [(i.since, math.inf if i.cleared_at is None else i.cleared_at) for i in incidents]
-    over += [(min(t.told.since, t.dive.t_dive), _ended(t)) for t in threads]
-    floor, before = cut, math.inf
-    while floor < before:  # what is kept may reach further back, and then keep more
-        before = floor
-        floor = min([before, *(since for since, end in over if end >= before)])
-    return floor
-
-
-def _ended(thread: Thread) -> float:
-    """When a thread had its last message (s); never while there may be one to come."""
-    if thread.withdrawn:
-        return thread.time
-    return math.inf if thread.told.cleared_at is None else max(thread.told.cleared_at, thread.time)
-
-
 def _forget_incidents(db: sqlite3.Connection, glider: str, cut: float) -> tuple[float, set[str]]:
     """Remove incidents that are over, with what was said of them: one that is gone, but told, would be
     withdrawn. The time (s) from which on all is kept for those that stay, and the threads that stay."""
     incidents, said = _incidents(db, glider), _said(db, glider)
-    floor = _floor(incidents, said.threads, cut)
-    gone = [(i.id,) for i in incidents if i.cleared_at is not None and i.cleared_at < floor]
+    floor = kept_since(incidents, said.threads, cut)
+    gone = [(i.id,) for i in incidents if is_removable(i, floor)]
     db.executemany("DELETE FROM incidents WHERE id = ?", gone)
     db.executemany("DELETE FROM acks WHERE incident = ?", gone)
-    threads = tuple(t for t in said.threads if _ended(t) >= floor)
+    threads = tuple(t for t in said.threads if ended_at(t) >= floor)
     if threads != said.threads:
         text = codec.plain_encode(replace(said, threads=threads))
         db.execute("UPDATE said SET data = ? WHERE glider = ?", (text, glider))
@@ -153,8 +129,8 @@ def _results(db: sqlite3.Connection, transaction: Transaction, glider: str) -> I
         "ORDER BY opened_at, name LIMIT 1",
         (glider,),
     ).fetchone()
-    if row is None or row[1] != FIRST:
-        return
+    if row is None or row[1] != FIRST or row[2] is None:
+        return  # without its checkpoint nothing tells where that begins: the next file makes it again
     opened_at, last = row[0], codec.decode(row[2], GliderState).last
     with transaction():
         until = opened_at if last is None else min(opened_at, last.t_dive)
@@ -257,43 +233,3 @@ def _compact(db: sqlite3.Connection) -> Iterator[int]:
     for _ in range(free // _PAGES + 1):
         db.executescript(f"PRAGMA incremental_vacuum({_PAGES})")  # `execute` frees one page: it steps by rows
         yield 0
-
-
-# ------------------------------------------------------------------------- when
-
-
-class Retention:
-    """Removes what is old once a day, a step at a time, whenever nothing else is to be done.
-
-    `steps` begins a run for a time before which all may go (s). The first is an hour after the start. A
-    clock that has jumped since the last time may be wrong by years: then nothing is removed that time.
-    """
-
-    def __init__(self, steps: Callable[[float], Iterator[int]], now: float, monotonic: float) -> None:
-        self._steps, self._offset = steps, now - monotonic
-        self._due = monotonic + HOUR
-        self._work: Iterator[int] | None = None
-        self._removed = 0
-
-    def pause(self, monotonic: float) -> float:
-        """Seconds until there is something to do."""
-        return max(0.0, self._due - monotonic)
-
-    def turn(self, keep_days: float | None, now: float, monotonic: float) -> None:
-        """Do one step, if one is due. Raises StateError; it is begun anew in an hour."""
-        if monotonic < self._due:
-            return
-        if self._work is None:
-            self._due = monotonic + DAY
-            is_steady = abs(now - monotonic - self._offset) < STEADY
-            self._offset = now - monotonic
-            if keep_days is None or not is_steady:
-                return
-            self._work, self._removed = self._steps(now - keep_days * DAY), 0
-        work, self._work, self._due = self._work, None, monotonic + HOUR
-        for removed in work:
-            self._removed += removed
-            self._work, self._due = work, monotonic
-            return
-        self._due = monotonic + DAY
-        log.info("what is older than state.keep_days is removed", rows=self._removed)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TypeVar
 
+from gliderwatch.model import Hindrance
 from gliderwatch.store import codec
 
 T = TypeVar("T")
@@ -24,7 +25,9 @@ class Status(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class File:
-    """A row of the ledger: ``reason`` says in words why it was not taken, ``crc`` the cache waited for.
+    """A row of the ledger: ``hindrance`` and, in words, ``reason`` say why it was not taken.
+
+    ``crc`` names the cache file that it waits for.
 
     ``opened_at`` (s) of its header is not in the row: it makes the file a sign of life when it is noted.
     """
@@ -38,6 +41,7 @@ class File:
     reason: str = ""
     crc: str = ""
     opened_at: float | None = field(default=None, compare=False)
+    hindrance: Hindrance | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +63,9 @@ class Undelivered:
 def file_of(row: sqlite3.Row) -> File:
     """The row of the ledger."""
     names = ("path", "size", "mtime_ns", "glider", "segment", "reason", "crc")
-    return File(status=Status(row["status"]), **{name: row[name] for name in names})
+    why = row["hindrance"] if "hindrance" in row.keys() else ""  # noqa: SIM118 (a row is no mapping)
+    hindrance = Hindrance(why) if why else None
+    return File(status=Status(row["status"]), hindrance=hindrance, **{name: row[name] for name in names})
 
 
 def values(db: sqlite3.Connection, sql: str, arguments: tuple[object, ...], kind: type[T]) -> list[T]:

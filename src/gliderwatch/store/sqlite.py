@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
-from gliderwatch.model import Alert, Assessment, Expected, Incident, SegmentId
-from gliderwatch.navigation.quality import NOT_SURFACED
+from gliderwatch.model import Alert, Assessment, Expected, Incident, SegmentId, Unusable
 from gliderwatch.pipeline import Outcome
-from gliderwatch.rules.announce import Said, unanswered
+from gliderwatch.rules.announce import Said
 from gliderwatch.store import codec, outbox, retention
 from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, read_only
 from gliderwatch.store.known import Known
@@ -108,9 +107,9 @@ class Store:
 
     def note(self, file: File, now: float) -> None:
         """Write what became of a file."""
-        f = file
-        row = (f.path, f.size, f.mtime_ns, f.status, f.glider, f.segment, f.reason, f.crc, now)
-        self._db.execute("INSERT OR REPLACE INTO files VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
+        f, why = file, file.hindrance or ""
+        row = (f.path, f.size, f.mtime_ns, f.status, f.glider, f.segment, f.reason, f.crc, now, why)
+        self._db.execute("INSERT OR REPLACE INTO files VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
 
     # --------------------------------------------------------------- retention
 
@@ -131,7 +130,7 @@ class Store:
         self._db.executemany(
             "INSERT OR REPLACE INTO assessments VALUES (?, ?, ?, ?, ?, ?)",
             [
-                (glider, a.t_dive, a.t_surface, a.reason != NOT_SURFACED, a.flag, codec.plain_encode(a))
+                (glider, a.t_dive, a.t_surface, _has_ended(a), a.flag, codec.plain_encode(a))
                 for a in outcome.assessments
             ],
         )
@@ -193,38 +192,21 @@ class Store:
         row = self._db.execute("SELECT data FROM said WHERE glider = ?", (glider,)).fetchone()
         return codec.plain_decode(row[0], Said) if row is not None else Said()
 
-    def say(
-        self,
-        glider: str,
-        said: Said,
-        alerts: Iterable[Alert],
-        channels: Callable[[Alert], Iterable[str]],
-        now: float,
-    ) -> None:
-        """Keep messages, one outbox row for each of their channels, and that they have been said.
-
-        What is held of incidents that are over by then is withdrawn (`answer`).
-        """
+    def keep_said(self, glider: str, said: Said) -> None:
+        """Keep what people have been told of a glider."""
         self._db.execute("INSERT OR REPLACE INTO said VALUES (?, ?)", (glider, codec.plain_encode(said)))
-        going_on = self.answer(glider, now)
-        for alert in alerts:
-            outbox.post(self._db, alert, channels(alert), now, going_on)
-
-    def answer(self, glider: str, now: float, *, quiet: bool = False) -> frozenset[str]:
-        """The threads that go on and that nobody has taken on, none of a glider that is `quiet`.
-
-        What is held of the others until it escalates is withdrawn.
-        """
-        going_on = frozenset[str]()
-        if not quiet:
-            incidents, acks = self.known(glider).incidents(), self.notes.acks(glider)
-            going_on = unanswered(self.said(glider), incidents, acks)
-        outbox.withdraw(self._db, glider, going_on, now)
-        return going_on
 
     def post(self, alert: Alert, channels: Iterable[str], now: float) -> None:
-        """Keep one message about no glider and put it into the outbox of its channels, as `outbox.post`."""
+        """Keep one message and put it into the outbox of its channels, as `outbox.post`."""
         outbox.post(self._db, alert, channels, now)
+
+    def standing(self, incident: str, channel: str, now: float) -> tuple[bool, float]:
+        """How an incident stands with a channel, as `outbox.standing`."""
+        return outbox.standing(self._db, incident, channel, now)
+
+    def withdraw(self, glider: str, unanswered: Collection[str], now: float) -> None:
+        """Escalate what is held of a glider no more, but for some threads, as `outbox.withdraw`."""
+        outbox.withdraw(self._db, glider, unanswered, now)
 
     def alerts(self) -> list[Alert]:
         """All messages, in the order in which they were made."""
@@ -237,3 +219,8 @@ class Store:
     def refused(self, since: float) -> list[Undelivered]:
         """What a channel refused for good, or could not be read, since a time (s); oldest first."""
         return outbox.refused(self._db, since)
+
+
+def _has_ended(dive: Assessment) -> bool:
+    """Whether the fix that ends a dive is known."""
+    return dive.unusable is not Unusable.NOT_SURFACED

@@ -16,8 +16,8 @@ from gliderwatch.model import Severity
 from gliderwatch.run import heartbeat
 from gliderwatch.run.doctor.finding import Finding, Findings, Level, error, note, ok, warning
 from gliderwatch.run.life import STALE, is_held, silence
-from gliderwatch.run.operator import failing, reading
 from gliderwatch.store.database import SCHEMA
+from gliderwatch.store.watch_health import failing, quick_check, schema_version
 
 _START = "systemctl start gliderwatch; journalctl -u gliderwatch tells why it ended"
 _STUCK = "systemctl restart gliderwatch; please report it, with its log"
@@ -45,9 +45,7 @@ def state(config: Config, problems: Iterable[Problem]) -> Findings:
         yield note("state", f"{path} is not there yet: the service makes it at its first start")
         return
     try:
-        with reading(path) as db:
-            version = db.execute("PRAGMA user_version").fetchone()[0]
-            told = db.execute("PRAGMA quick_check(1)").fetchone()[0]
+        version, told = schema_version(path), quick_check(path)
     except DamagedError as problem:
         told, version = str(problem), SCHEMA
     except StateError as problem:

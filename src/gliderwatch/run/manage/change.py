@@ -12,7 +12,7 @@ from gliderwatch.store.sqlite import Store
 
 _MOST = 50
 """Dives and files named; the rest is counted."""
-_WORDS = {Flag.NORMAL: "0 normal", Flag.ANOMALY: "1 anomaly", Flag.FALSE_ALARM: "2 false alarm"}
+_WORDS = {Flag.NORMAL: "0 normal", Flag.ANOMALY: "1 anomaly", Flag.FALSE_ALARM: "2 measurements disagree"}
 
 
 @dataclass(frozen=True, slots=True)

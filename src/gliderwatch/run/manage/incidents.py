@@ -12,6 +12,7 @@ from gliderwatch.model import Assessment, Incident
 from gliderwatch.rules.acknowledged import Ack, acknowledge
 from gliderwatch.run.lines import iso
 from gliderwatch.run.manage.opening import reading, writing
+from gliderwatch.run.posting import withdraw_answered
 from gliderwatch.store.sqlite import Store
 
 
@@ -65,7 +66,7 @@ def ack(config: Config, identity: str, by: str, note: str, now: float) -> tuple[
             return noted, False
         made = acknowledge(noted.incident, by, note, now)
         store.notes.acknowledge(noted.incident.glider, made)
-        store.answer(noted.incident.glider, now)
+        withdraw_answered(store, noted.incident.glider, now)
     return Noted(noted.incident, made), True
 
 

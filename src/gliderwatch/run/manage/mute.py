@@ -8,7 +8,9 @@ from gliderwatch.alerts.words import utc
 from gliderwatch.config import Config
 from gliderwatch.config.fields import moment
 from gliderwatch.errors import GliderwatchError
+from gliderwatch.rules.muting import with_mute
 from gliderwatch.run.manage.opening import known_glider, writing
+from gliderwatch.run.posting import withdraw_answered
 
 _YEAR = 366 * 86400.0
 
@@ -42,8 +44,8 @@ def mute(config: Config, glider: str, end: float, now: float) -> list[str]:
     name = known_glider(config, glider)
     with writing(config) as store:
         store.notes.mute(name, end, now)
-        store.answer(name, now, quiet=True)
-        heeded = store.notes.heeded(name, config.attention(name))
+        withdraw_answered(store, name, now, quiet=True)
+        heeded = with_mute(config.attention(name), store.notes.muted_until(name))
     told = [f"{name}: muted until {utc(end)}"]
     if heeded.muted_until is not None and heeded.muted_until > end:
         told.append(f"muted_until of the configuration is later and counts: {utc(heeded.muted_until)}")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 
 from gliderwatch.config import Config
 from gliderwatch.errors import ConfigError, StateError
-from gliderwatch.store.database import SCHEMA, read_only
+from gliderwatch.store.database import SCHEMA
 from gliderwatch.store.sqlite import Store
+from gliderwatch.store.watch_health import schema_version
 
 
 @contextmanager
@@ -31,8 +32,7 @@ def writing(config: Config) -> Iterator[Store]:
     be of the release before.
     """
     path = Path(config.state.path)
-    with closing(read_only(path)) as db:
-        version = int(db.execute("PRAGMA user_version").fetchone()[0])
+    version = schema_version(path)
     if version < SCHEMA:
         raise StateError(
             f"state file {path} is of an earlier release (schema {version}, now {SCHEMA}). "

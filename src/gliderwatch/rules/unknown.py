@@ -1,0 +1,150 @@
+"""When no dive of a glider can be judged although it is at sea: a blind watch speaks. Pure.
+
+Files that wait or cannot be read are signs of life: the glider is not overdue. But nothing is known of how it
+flies, which must not look like health. The same holds for dives that came and have no flag.
+
+As with incidents, the messages are the difference between what is known and what people have been told, so
+that no order of arrival matters and nothing is told twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from gliderwatch.alerts import unknown as message
+from gliderwatch.alerts.unknown import Blindness, Unjudged
+from gliderwatch.model import Alert, Expected, Unusable
+from gliderwatch.params import Attention
+from gliderwatch.rules.silence import GONE, HOUR, Sign, is_at_sea, rhythm
+
+USUAL_HOURS = 24.0
+"""Hours that tell two deployments apart where `unknown_hours` is not given."""
+SHORTEST = 900.0
+"""Seconds: what is shorter is no dive (as in `navigation.dives`) but a file of tests on deck."""
+INTERVALS = 2.0
+"""Intervals between surfacings until a dive is judged, at most: the fix that ends it, and its current,
+come with the file after it."""
+THINNED = 7.0
+"""Reminders come after 1, 2 and 4 times `reminder_hours`, then each time after so many of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """What people have been told of one time in which nothing could be judged.
+
+    It began at ``since`` (s); there were so many ``messages``, the last of them at ``time`` (s). ``is_over``
+    once a dive was judged again.
+    """
+
+    id: str
+    since: float
+    messages: int
+    time: float
+    is_over: bool = False
+
+
+class Known(Protocol):
+    """What is known of one glider now; the store answers."""
+
+    glider: str
+
+    def expected(self, until: float) -> Expected | None:
+        """What was expected after the last surfacing at `until` (s) or before."""
+
+    def judged(self, until: float) -> float | None:
+        """The last surfacing (s) at `until` (s) or before whose dive has a flag."""
+
+    def unjudged(self, since: float) -> tuple[Unjudged, ...]:
+        """Dives without a flag, and files that were not taken, that began later than `since` (s)."""
+
+    def signs(self, since: float) -> tuple[Sign, ...]:
+        """Its files that were opened at `since` (s) or later."""
+
+
+def blindness(known: Known, attention: Attention, now: float) -> Blindness | None:
+    """The time up to `now` (s) in which nothing could be judged, where it is long enough to be told."""
+    judged = known.judged(now)
+    since = now - GONE if judged is None else max(judged, now - GONE)
+    items = _run([i for i in known.unjudged(since) if i.start <= now], _apart(attention), now)
+    if not items or not _is_long(items, known.expected(now), attention):
+        return None
+    signs = known.signs(now - GONE)
+    if not is_at_sea(signs, rhythm(signs, now) or 0.0, now):
+        return None
+    return Blindness(known.glider, items[0].start, _end(items), judged, items)
+
+
+def _apart(attention: Attention) -> float:
+    """Seconds without anything of a glider after which what comes belongs to another deployment."""
+    return HOUR * (USUAL_HOURS if attention.unknown_hours is None else attention.unknown_hours)
+
+
+def _run(items: Iterable[Unjudged], apart: float, now: float) -> tuple[Unjudged, ...]:
+    """The last of some items that follow each other without a pause, in order of time.
+
+    Each ends where the next begins: a file that was not taken may have come late.
+    """
+    run: list[Unjudged] = []
+    for item in sorted(items, key=lambda i: (i.start, i.end)):
+        if run and item.start - _end(run) > apart:
+            run = []
+        if run and run[-1].end > item.start:
+            run[-1] = replace(run[-1], end=item.start)
+        run.append(replace(item, end=min(item.end, now)))
+    return tuple(run)
+
+
+def _end(items: Iterable[Unjudged]) -> float:
+    return max(item.end for item in items)
+
+
+def _is_long(items: tuple[Unjudged, ...], expected: Expected | None, attention: Attention) -> bool:
+    """Whether it lasted for as many hours, or dives, as are to be told."""
+    hours, dives = attention.unknown_hours, attention.unknown_dives
+    if dives is not None and _dives(items) >= dives:
+        return True
+    interval = 0.0 if expected is None else expected.t - expected.after
+    return hours is not None and _end(items) - items[0].start >= max(hours * HOUR, INTERVALS * interval)
+
+
+def _dives(items: tuple[Unjudged, ...]) -> int:
+    """How many dives the items stand for.
+
+    Where files are not taken, the dive between them has data missing: it is counted once.
+    """
+    has_files = any(item.is_file for item in items)
+    return sum(
+        item.end - item.start >= SHORTEST and not (has_files and item.cause is Unusable.DATA_MISSING)
+        for item in items
+    )
+
+
+def announce(
+    before: Unknown | None, known: Known, attention: Attention, reminder_hours: float | None, now: float
+) -> tuple[Unknown | None, list[Alert]]:
+    """What people have been told after the messages that are due `now` (s), and these."""
+    found = blindness(known, attention, now)
+    if before is None or before.is_over:
+        return (before, []) if found is None else _begun(before, found)
+    identity = f"{before.id}/{before.messages}"
+    at = known.judged(now)
+    if at is not None and at > before.since and found is None:
+        alert = message.judged(known.glider, before.since, at, alert_id=identity, thread=before.id)
+        return replace(before, messages=before.messages + 1, time=at, is_over=True), [alert]
+    if found is None or reminder_hours is None:
+        return before, []
+    pause = min(2.0 ** (before.messages - 1), THINNED) * reminder_hours * HOUR
+    if found.until - before.time < pause:
+        return before, []
+    alert = message.blind(found, alert_id=identity, thread=before.id, first=False)
+    return replace(before, messages=before.messages + 1, time=found.until), [alert]
+
+
+def _begun(before: Unknown | None, found: Blindness) -> tuple[Unknown, list[Alert]]:
+    identity = f"{found.glider}/unknown/{found.since:.0f}"
+    if before is not None and before.id.rstrip("+") == identity:
+        identity = before.id + "+"
+    alert = message.blind(found, alert_id=f"{identity}/0", thread=identity, first=True)
+    return Unknown(identity, found.since, 1, found.until), [alert]

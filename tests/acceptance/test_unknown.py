@@ -1,0 +1,68 @@
+"""The service is blind: files come that wait for a cache, and the pilots hear why, and that it is over."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from acceptance.support import TRACEBACK, Daemon, Site, command, lines, mail_server, until
+from gliderwatch.ingest.header import parse_header
+from gliderwatch.simulate.dockserver import arrivals, cache, write_cache
+from gliderwatch.simulate.glider import simulate
+from gliderwatch.simulate.scenario import Mission, Scenario
+from gliderwatch.store.sqlite import Status
+
+DAY = 86400.0
+GLIDER = "cora"
+HEALTHY = 42
+"""Files before somebody changed the sbd list."""
+
+
+def other_list(data: bytes, number: int) -> bytes:
+    """A file as it came; after the change its header names another cache file."""
+    crc = parse_header(data).crc.encode()
+    at = data.lower().index(crc)
+    return data if number < HEALTHY else data[:at] + b"deadbeef" + data[at + 8 :]
+
+
+def mission(end: float) -> Mission:
+    """Seventeen healthy days until a time (s): some forty dives, and ten days more."""
+    return simulate(Scenario(seed=5, glider=GLIDER, days=17.0, start=end - 17.0 * DAY))
+
+
+def test_pilots_hear_that_nothing_can_be_judged_and_that_it_can_again(tmp_path: Path) -> None:
+    site, made = Site(tmp_path), mission(time.time())
+    site.caches(made)
+    with mail_server() as box:
+        site.configure(GLIDER, url=box.url, defaults={})
+        for number, file in enumerate(arrivals(made)):
+            site.put(GLIDER, file.name, other_list(file.data, number))
+        with Daemon(site) as daemon:
+            until(lambda: box.mails, "the pilot is told")
+            assert [f.status for f in site.files().values()].count(Status.WAITING) > 60
+            (mail,) = box.mails
+            assert "CANNOT BE JUDGED cora: " in mail.subject
+            assert f"cache file deadbeef.cac is missing: not in {site.cache}" in mail.text
+            assert "copy deadbeef.cac from the dockserver" in mail.text
+            lost = parse_header(next(iter(arrivals(made))).data).crc
+            (site.cache / "deadbeef.cac").write_bytes(cache(made)[f"{lost}.cac"])
+            until(lambda: len(box.mails) == 2, "the pilot is told that it is over")
+            until(lambda: Status.WAITING not in {f.status for f in site.files().values()}, "all is taken")
+    assert "ALL CLEAR cora: its dives can be judged again" in box.mails[1].subject
+    assert len(box.mails) == 2 and TRACEBACK not in daemon.text()
+
+
+def test_the_replay_command_says_the_same(tmp_path: Path) -> None:
+    """Of a mission of years ago, at the time of its data."""
+    made = mission(Scenario().start)
+    write_cache(tmp_path / "cache", made)
+    for number, file in enumerate(arrivals(made)):
+        path = tmp_path / "gliders" / file.name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(other_list(file.data, number))
+    result = command("run", "--replay", tmp_path / "gliders", "--out", tmp_path / "out")
+    assert result.returncode == 0, result.stderr
+    told = lines(tmp_path / "out" / "alerts.jsonl")
+    assert [a["kind"] for a in told] == ["unknown", *["reminder"] * (len(told) - 1)]
+    assert {a["severity"] for a in told} == {"warning"} and 4 <= len(told) <= 5
+    assert "missing: not in" in told[0]["body"] and str(tmp_path / "cache") in told[0]["body"]
