@@ -165,3 +165,32 @@ def test_range_can_be_tightened():
     tight = replace(PARAMS, learning=replace(RangeParams(), narrowest=0.05, widest=0.05))
     _, verdicts = run(mission([*[Way()] * 8, *[slower(Way(), 0.12)] * 2]), tight)
     assert verdicts[-1].flag is Flag.ANOMALY
+
+
+# --------------------------------------------------------------------------- new ways of flying
+
+
+def test_a_faster_glider_is_flown_in_a_new_way():
+    made = ways(40, 9, lambda k: 0.7 * (k // 5))
+    made = [w if k < 15 else replace(w, speed=2 * w.speed, own=2 * w.own) for k, w in enumerate(made)]
+    _, verdicts = run(mission(made))
+    assert flags(verdicts[15:18]) == [None, None, Flag.NORMAL]
+    assert "new normal speed" in verdicts[17].reason
+    assert set(flags(verdicts[18:])) == {Flag.NORMAL}
+    assert verdicts[20].normal.usual == pytest.approx(0.46, abs=0.03)
+    slowed = [w if k < 25 else slower(w, 0.4) for k, w in enumerate(made)]
+    _, verdicts = run(mission(slowed))
+    assert Flag.ANOMALY in flags(verdicts[25:28])
+
+
+def test_no_heading_is_judged_by_what_the_current_leaves():
+    """The same glider, the headings of which are not sent: on a steady course |g - c| is its speed."""
+    dives = mission(ways(40, 3, lambda k: 0.7 * (k // 5)))
+    slow = [w if k < 25 else slower(w, 0.5) for k, w in enumerate(ways(40, 3, lambda k: 0.7 * (k // 5)))]
+    for made, told in ((dives, False), (mission(slow), True)):
+        blind = [replace(d, features=replace(d.features, heading_reckoned=True)) for d in made]
+        _, verdicts = run(blind)
+        assert None not in flags(verdicts[:25])
+        assert verdicts[20].info.estimate.speed == pytest.approx(0.23, abs=0.02)
+        assert (Flag.ANOMALY in flags(verdicts[25:28])) == told
+        assert Flag.FALSE_ALARM not in flags(verdicts)

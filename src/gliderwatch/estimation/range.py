@@ -76,6 +76,14 @@ def learn(
     return Normal(readonly([*normal.speeds, speed]), readonly([*normal.settings, at]))
 
 
+def renewed(normal: Normal, speeds: tuple[float, ...], at: float) -> Normal:
+    """The healthy dives where those at a setting are now these alone: the glider is flown in a new way."""
+    kept = ~_alike(normal, at)
+    return Normal(
+        readonly([*normal.speeds[kept], *speeds]), readonly([*normal.settings[kept], *([at] * len(speeds))])
+    )
+
+
 def speed_range(normal: Normal, at: float, params: RangeParams) -> SpeedRange | None:
     """The normal range at a setting; None as long as too few dives tell.
 

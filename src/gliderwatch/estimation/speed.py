@@ -16,7 +16,7 @@ from gliderwatch.estimation import joint
 from gliderwatch.estimation.causes import Cause
 from gliderwatch.estimation.joint import JointInfo, JointParams, JointState
 from gliderwatch.estimation.observation import USUAL_PITCH, are_apart, slip_at
-from gliderwatch.estimation.range import Normal, RangeParams, SpeedRange, learn, setting, speed_range
+from gliderwatch.estimation.range import Normal, RangeParams, SpeedRange, learn, renewed, setting, speed_range
 from gliderwatch.estimation.reckoned import Ratios, Reckoned, reckon
 from gliderwatch.estimation.reckoned import learn as learn_ratios
 from gliderwatch.model import Dive, Flag
@@ -31,11 +31,20 @@ OWN_SURE = 0.15
 NOT_SEEN = "it turned, and its heading is not in the file: the speed cannot be told"
 ROLL_CONFIRMS = 0.67
 """Standard errors by which a speed must be below normal where the glider rolls otherwise for two dives: three to one."""
+FASTER = "faster than ever: the current is wrong, or it is driven harder"
 HIDDEN = 0.1
 """Part of the speed that the glider believes, by which it must be slower to be slower than that."""
 ROLLED, ROLLS = 0.12, 5
 """rad: a step of the mean roll that speaks for a lost or bent wing; dives that tell the usual roll, and
 samples that tell the roll of a dive."""
+Trim = tuple[float | None, ...]
+"""What a pilot chooses of a dive: pitch diving and climbing (rad), volume pumped diving and climbing (m3)."""
+AGREE, ENOUGH = 0.12, 3
+"""Part of it by which speeds of a new way of flying differ at most, and dives in a row that make it one."""
+EXPLAINED = 0.7
+"""Part of the usual speed that is left at least after a change of trim: pitch and ballast take no more."""
+RETRIMMED = (0.08, 0.08, 30e-6, 30e-6)
+"""Change of each number of the trim that was the pilot's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +76,8 @@ class SpeedState:
     ``joint`` estimate (None: no dive yet), ``normal`` speeds learnt, ``rolls`` (rad) of the first healthy
     dives, ``rolled`` dives in a row that roll otherwise, ``slow`` Page's sum of small losses, ``doubted``
     slow dives in a row that were not believed, ``misfits`` of the last dives, ``ratios`` of the speed to
-    what the glider tells of it.
+    what the glider tells of it; ``trim`` of the last normal dive, ``other`` speeds (m/s) of the last dives in a row that
+    may be a new way of flying.
     """
 
     joint: JointState | None = None
@@ -78,6 +88,8 @@ class SpeedState:
     doubted: int = 0
     misfits: tuple[Misfit, ...] = ()
     ratios: Ratios = Ratios()
+    trim: Trim = ()
+    other: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,9 +132,59 @@ def step(
     if (flag is None and info.seen.is_free) or assumed:
         reason = NOT_SEEN if assumed else reason
         flag, reason = _by_reckoning(reason, state, told, normal, params)
+    state, flag, reason, normal = _regime(state, dive, info, told, normal, flag, reason, params)
     if flag is Flag.NORMAL and not frozen:
-        state = _learnt(state, dive, info, at, params)
+        state = replace(_learnt(state, dive, info, at, params), trim=_trim(dive))
     return state, Verdict(flag, reason, normal, info)
+
+
+def _regime(
+    state: SpeedState,
+    dive: Dive,
+    info: JointInfo,
+    told: Reckoned | None,
+    normal: SpeedRange,
+    flag: Flag | None,
+    reason: str,
+    params: SpeedParams,
+) -> tuple[SpeedState, Flag | None, str, SpeedRange]:
+    """What is said of a dive out of its range that may be flown in a new way, and the state with that.
+
+    A faster glider is no fault: three dives at one speed, which depth rate and pitch do not deny, are a new way of
+    flying with a range of its own. A slower one is that only where the pilot changed pitch or ballast.
+    """
+    speed, learning = info.estimate.speed, params.learning
+    faster = reason == FASTER
+    explained = speed > EXPLAINED * normal.usual and retrimmed(state.trim, _trim(dive))
+    slower = flag is Flag.ANOMALY and explained and told is not None and info.believes
+    if learning is None or not normal.dives or not (faster or slower):
+        return (replace(state, other=()) if state.other else state), flag, reason, normal
+    if faster and told is not None and not info.believes:
+        return replace(state, other=()), flag, reason, normal
+    row = (*(each for each in state.other if abs(each / speed - 1) < AGREE), speed)
+    if len(row) < ENOUGH:
+        words = f"{'faster' if faster else 'slower'} than before: a new way of flying, or the current is wrong"
+        return replace(state, other=row), None, f"{words}: the next dives will tell", normal
+    at = setting(dive.features)
+    state = replace(state, normal=renewed(state.normal, row, at), other=(), slow=0.0, doubted=0)
+    new = speed_range(state.normal, at, learning) or normal
+    words = f"flies {'faster' if faster else 'slower'} since {ENOUGH - 1} dives ago: {speed:.2f} m/s is its new normal speed"
+    return state, Flag.NORMAL, f"{words}, unless you say otherwise", new
+
+
+def _trim(dive: Dive) -> Trim:
+    f = dive.features
+    return (f.pitch_dive, f.pitch_climb, f.ballast_dive, f.ballast_climb)
+
+
+def retrimmed(before: Trim, now: Trim) -> bool:
+    """Whether the pilot changed pitch or ballast between two dives.
+
+    >>> retrimmed((-0.45, 0.45, None, None), (-0.35, 0.36, None, None)), retrimmed((), (-0.45, 0.45, None, None))
+    (True, False)
+    """
+    pairs = zip(before, now, RETRIMMED, strict=False)
+    return any(a is not None and b is not None and abs(a - b) > least for a, b, least in pairs)
 
 
 def _misfits(state: SpeedState, info: JointInfo) -> tuple[Misfit, ...]:
@@ -197,7 +259,7 @@ def _slow_or_fast(
     state = replace(state, doubted=0)
     if info.estimate.speed - sigma > normal.high:
         if normal.dives:
-            return state, Flag.FALSE_ALARM, "faster than ever: the current is wrong, or it is driven harder"
+            return state, Flag.FALSE_ALARM, FASTER
         return state, Flag.ANOMALY, "faster than normal"
     return _small_losses(state, info, normal, params)
 
