@@ -42,8 +42,8 @@ _INCIDENTS = (Kind.ANOMALY, Kind.FALSE_ALARM)
 class Healthy:
     """What is said of healthy gliders in one kind of sea. Messages are per glider-month, ``unknown`` of
     them that nothing could be judged, ``all_kinds`` all; ``judged`` is the part of dives with a flag, ``rms``
-    (m/s) and ``inside`` (part in the 95 % interval) of speeds from day 3; ``miss`` (km) and ``covered`` of the
-    ``forecasts`` of dives of three hours, ``late_covered`` of their times; ``cost`` (ms) a dive."""
+    (m/s) and ``inside`` (part in the 95 % interval) of speeds from day 3; ``miss`` (km) and ``covered`` of
+    the ``forecasts`` of dives of three hours, ``late_covered`` of their times; ``cost`` (ms) a dive."""
 
     sea: str
     months: float
@@ -64,8 +64,8 @@ class Healthy:
 @dataclass(frozen=True)
 class Faulty:
     """What is said of a fault in one kind of sea. ``told`` is the part told as what it is within 15 days, by
-    an incident that opens, ``otherwise`` that told as something else at any time; ``delay`` (h, median, infinite
-    where most are not told); messages in two days and in fifteen: mean and most."""
+    an incident that opens, ``otherwise`` that told as something else at any time; ``delay`` (h, median,
+    infinite where most are not told); messages in two days and in fifteen: mean and most."""
 
     sea: str
     fault: str

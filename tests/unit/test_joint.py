@@ -4,9 +4,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gliderwatch.estimation import joint
+from gliderwatch.estimation import flow, joint
 from gliderwatch.estimation.causes import MODES, Cause
-from gliderwatch.estimation import flow
 from gliderwatch.estimation.flow import FlowParams, passage, prior
 from gliderwatch.estimation.joint import JointParams, step
 from gliderwatch.estimation.observation import observe

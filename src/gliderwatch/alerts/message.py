@@ -85,8 +85,8 @@ def all_clear(
     end = assessment.t_surface if incident.cleared_at is None else incident.cleared_at
     still = " and ".join(f"the {_name(other)} since {utc(other.since)}" for other in others)
     if still:
-        lead = f"{_glider(incident)}: the {_name(incident)} is over, but not all is well: {still} is still open. "
-        lead += f"Latest dive: {flag_words(assessment)}."
+        lead = f"{_glider(incident)}: the {_name(incident)} is over, but not all is well: "
+        lead += f"{still} is still open. Latest dive: {flag_words(assessment)}."
         title = f"ALL CLEAR {_glider(incident)}: {_name(incident)} over, {_name(others[0])} still open"
     elif incident.kind is Kind.FALSE_ALARM:
         lead = f"{_glider(incident)}: the measurements agree again, {_against_range(assessment)}. "

@@ -1,9 +1,10 @@
 """How a dive can be explained: the table of modes, and how likely each is after a dive. Pure.
 
-A multi-process model (Harrison and Stevens 1976): beside "as usual" a dive may show another speed, another flow, a
-wrong current or a wrong ground velocity; and the speed that the glider tells beside the current may have nothing to do
-with the speed. Each mode opens one thing. An iterated update finds the likeliest state under each, log-sum-exp over the
-modes their weights, and the state after the dive is the mixture (GPB of order one).
+A multi-process model (Harrison and Stevens 1976): beside "as usual" a dive may show another speed, another
+flow, a wrong current or a wrong ground velocity; and the speed that the glider tells beside the current may
+have nothing to do with the speed. Each mode opens one thing. An iterated update finds the likeliest state
+under each, log-sum-exp over the modes their weights, and the state after the dive is the mixture (GPB of
+order one).
 """
 
 from __future__ import annotations
@@ -20,9 +21,11 @@ from gliderwatch.model import Array
 
 ITERATIONS = 3
 BEYOND = 0.02
-"""m/s by which a speed may be found beyond what a glider can fly, before that speaks against an explanation."""
+"""m/s by which a speed may be found beyond what a glider can fly, before that speaks against an
+explanation."""
 STAYS = 0.6
-"""Chance that a current, or a ground velocity, which is wrong on one dive is wrong on the next one too: a fault lasts."""
+"""Chance that a current, or a ground velocity, which is wrong on one dive is wrong on the next one too: a
+fault lasts."""
 LEFT_OUT = 10.0
 """m/s: error given to a measurement that is wrong: it is left out, be it as near as it may."""
 
@@ -45,8 +48,8 @@ class Cause(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Mode:
-    """``chance`` of it on a dive, how large what it opens usually is (``size``, m/s, a component), and the ``words``
-    for a dive that it explains best."""
+    """``chance`` of it on a dive, how large what it opens usually is (``size``, m/s, a component), and the
+    ``words`` for a dive that it explains best."""
 
     cause: Cause
     chance: float
@@ -69,27 +72,33 @@ MODES = (
 
 
 def switched(modes: tuple[Mode, ...], before: Mapping[Cause, float]) -> tuple[Mode, ...]:
-    """The modes with the chances that they have after a dive which was explained so ``before``: what is wrong stays."""
-    rare = {mode.cause: max(mode.chance, STAYS * before.get(mode.cause, 0.0)) for mode in modes if mode.cause.is_error}
+    """The modes with the chances that they have after a dive which was explained so ``before``: what is
+    wrong stays."""
+    rare = {
+        mode.cause: max(mode.chance, STAYS * before.get(mode.cause, 0.0))
+        for mode in modes
+        if mode.cause.is_error
+    }
     left = 1 - sum(rare.values())
     rest = sum(mode.chance for mode in modes if not mode.cause.is_error)
     return tuple(
-        replace(mode, chance=rare.get(mode.cause, mode.chance / rest * left if rest else left)) for mode in modes
+        replace(mode, chance=rare.get(mode.cause, mode.chance / rest * left if rest else left))
+        for mode in modes
     )
 
 
 ROLLED = Mode(Cause.WING, 9.0, 0.45)
-"""Beside these where the glider has just begun to roll otherwise, which little else does: nine to one. ``size`` is of
-slip, a third of that of side."""
+"""Beside these where the glider has just begun to roll otherwise, which little else does: nine to one.
+``size`` is of slip, a third of that of side."""
 
 
 @dataclass(frozen=True, slots=True)
 class Explained:
     """A dive as one of the modes has it.
 
-    ``cause`` with its ``weight``, and whether the glider ``believes``: the speed that it tells fits. ``rows`` ((m, 5)),
-    ``innovation`` ((m,)) and ``noise`` ((m, m)) are linear about the likeliest state; ``square`` is the innovation
-    normalised.
+    ``cause`` with its ``weight``, and whether the glider ``believes``: the speed that it tells fits.
+    ``rows`` ((m, 5)), ``innovation`` ((m,)) and ``noise`` ((m, m)) are linear about the likeliest state;
+    ``square`` is the innovation normalised.
     """
 
     cause: Cause
@@ -112,8 +121,8 @@ def explain(
 ) -> list[Explained]:
     """The dive in each of the modes, with weights that add up to 1.
 
-    ``x`` ((5,)) and ``cov`` ((5, 5)) are what was expected of the numbers that a dive shows, ``jumped`` ((5, 5)) how
-    these vary where the flow steps by 1 m/s.
+    ``x`` ((5,)) and ``cov`` ((5, 5)) are what was expected of the numbers that a dive shows, ``jumped`` ((5,
+    5)) how these vary where the flow steps by 1 m/s.
     """
     if not measured.has_current:
         modes = tuple(mode for mode in modes if not mode.cause.is_error)
@@ -144,7 +153,9 @@ def explain(
     noise = np.where(left_out, LEFT_OUT**2, noise)
     inverse = np.linalg.inv(slope @ turned + noise)
     return [
-        Explained(mode.cause, mode.size, float(weights[k]), believes, slope[k], innovation[k], noise[k], inverse[k])
+        Explained(
+            mode.cause, mode.size, float(weights[k]), believes, slope[k], innovation[k], noise[k], inverse[k]
+        )
         for k, (mode, believes) in enumerate(each)
     ]
 
@@ -152,8 +163,8 @@ def explain(
 def _opened(
     each: list[tuple[Mode, bool]], cov: Array, jumped: Array, measured: Measured
 ) -> tuple[Array, Array, Array]:
-    """Covariances of the state ((k, 5, 5)), what is added to the noise ((k, m, m)), and logarithms of the chances
-    ((k,)), of modes and of whether the speed that the glider tells fits."""
+    """Covariances of the state ((k, 5, 5)), what is added to the noise ((k, m, m)), and logarithms of the
+    chances ((k,)), of modes and of whether the speed that the glider tells fits."""
     tells, m = measured.tells, len(measured.values)
     opened, wrong, logs = np.tile(cov, (len(each), 1, 1)), np.zeros((len(each), m, m)), np.zeros(len(each))
     for k, (mode, believes) in enumerate(each):
@@ -173,4 +184,3 @@ def _opened(
                 wrong[k, -1, -1] = FASTEST**2
                 logs[k] += log(sqrt(2 * pi))
     return opened, wrong, logs
-

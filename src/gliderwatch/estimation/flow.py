@@ -4,15 +4,16 @@ The flow, east + i north, is a sum of complex parts that know nothing of each ot
 
     dz = (i omega - 1 / tau) z dt + sqrt(q) dB
 
-a lasting part and a passing one (omega 0), inertial motion (clockwise at the Coriolis frequency in the north), and
-two rotary parts a tidal constituent, one each way round: any ellipse is the sum of the two, and what they wander in
-time makes spring, neap and the way from one sea to the next. How strong the tides are is learnt from the mission:
-their prior reaches from nothing to 1 m/s, and they wander by a part of what they have been found to be. What is not
-known yet is wide, not wrong.
+a lasting part and a passing one (omega 0), inertial motion (clockwise at the Coriolis frequency in the
+north), and two rotary parts a tidal constituent, one each way round: any ellipse is the sum of the two, and
+what they wander in time makes spring, neap and the way from one sea to the next. How strong the tides are is
+learnt from the mission: their prior reaches from nothing to 1 m/s, and they wander by a part of what they
+have been found to be. What is not known yet is wide, not wrong.
 
-State: east and north of each part at the end of the last dive, then east and north of the mean flow over that dive
-(m/s). The mean is the integral over the dive divided by its length, exact for any length and any gap between dives:
-it is what a depth-averaged current measures, and times the length it is the displacement by the water (002).
+State: east and north of each part at the end of the last dive, then east and north of the mean flow over
+that dive (m/s). The mean is the integral over the dive divided by its length, exact for any length and any
+gap between dives: it is what a depth-averaged current measures, and times the length it is the displacement
+by the water (002).
 """
 
 from __future__ import annotations
@@ -51,9 +52,9 @@ class Tide:
 class FlowParams:
     """Sizes (m/s) and memories (s) of the parts, in a component.
 
-    ``lasting``, ``passing`` and ``inertial`` with their memories; ``tide_wander`` the part of a tidal part that
-    changes in a day, of what it is and of ``tide_least`` (m/s) at least; ``scale`` (m) over which currents differ by
-    their own size.
+    ``lasting``, ``passing`` and ``inertial`` with their memories; ``tide_wander`` the part of a tidal part
+    that changes in a day, of what it is and of ``tide_least`` (m/s) at least; ``scale`` (m) over which
+    currents differ by their own size.
     """
 
     lasting: float = 0.3
@@ -166,8 +167,8 @@ def jump(params: FlowParams) -> Array:
 def crossing(flow: Array, ground: Array, dt: float, params: FlowParams) -> float:
     """By how much (m/s) a flow (m/s, (2,)) usually differs after ``dt`` seconds at a velocity over ground.
 
-    A strong current is a narrow one: it differs by its own size over a distance of ``params.scale``. Tides are wider:
-    only the other parts are meant.
+    A strong current is a narrow one: it differs by its own size over a distance of ``params.scale``. Tides
+    are wider: only the other parts are meant.
     """
     return float(np.hypot(*flow)) * min(float(np.hypot(*ground)) * dt / params.scale, 1.0)
 
@@ -184,7 +185,8 @@ def _integral(a: Complex, t: float) -> Complex:
 
 
 def _wandered(a: Complex, t: float) -> tuple[Complex, Array]:
-    """Covariance of the integral of what chance adds with that itself, and its variance, at unit intensity."""
+    """Covariance of the integral of what chance adds with that itself, and its variance, at unit
+    intensity."""
     square, linear, small = _squared(a, t), _integral(a, t), np.abs(a * t) < _SMALL
     cross = np.where(small, t**2 / 2, (square - np.conj(linear)) / a)
     own = np.where(small, t**3 / 3, (square - 2 * linear.real + t) / np.abs(a) ** 2)
@@ -194,8 +196,7 @@ def _wandered(a: Complex, t: float) -> tuple[Complex, Array]:
 def _put(matrix: Array, values: Complex | Array, rows: object, columns: object) -> None:
     """Add complex factors as real blocks of two by two at pairs of places."""
     i, j = 2 * np.asarray(rows), 2 * np.asarray(columns)
-    values = np.asarray(values)
-    np.add.at(matrix, (i, j), values.real)
-    np.add.at(matrix, (i + 1, j + 1), values.real)
-    np.add.at(matrix, (i + 1, j), values.imag)
-    np.add.at(matrix, (i, j + 1), -values.imag)
+    matrix[i, j] += values.real
+    matrix[i + 1, j + 1] += values.real
+    matrix[i + 1, j] += values.imag
+    matrix[i, j + 1] -= values.imag

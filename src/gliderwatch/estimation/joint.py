@@ -1,10 +1,11 @@
 """Speed and flow together: a switching Kalman filter, one dive a step. Pure.
 
-State: the flow (see `flow`), and at its end the speed W that the glider reckons with, slip and side (see `measurement`).
-g - c = W h, so W is seen at once in any sea, and with it any drag on the whole body. What the glider itself does not
-know (angle of attack, lost wing, wrong compass) is in c as well: it can be seen only where the flow lasts while the
-heading turns. A test for a step (`detection.sequential`) looks for it; when it speaks, slip and side are opened by as
-much as the step is uncertain, within what a wing or a compass can do.
+State: the flow (see `flow`), and at its end the speed W that the glider reckons with, slip and side (see
+`measurement`). g - c = W h, so W is seen at once in any sea, and with it any drag on the whole body. What
+the glider itself does not know (angle of attack, lost wing, wrong compass) is in c as well: it can be seen
+only where the flow lasts while the heading turns. A test for a step (`detection.sequential`) looks for it;
+when it speaks, slip and side are opened by as much as the step is uncertain, within what a wing or a
+compass can do.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ from gliderwatch.estimation.reckoned import Reckoned
 from gliderwatch.model import Array, Dive, Fix, readonly
 
 LEAST_SLIP, MOST_SLIP, MOST_SIDE = -0.1, 0.95, 0.85
-"""What slip of the state can be: on board at most a tenth of W too much is allowed for the angle of attack, and a
-glider does not fly backwards. A compass, or a bent wing, that turns the way by more than a radian (its sine) is not
-thought of."""
+"""What slip of the state can be: on board at most a tenth of W too much is allowed for the angle of attack,
+and a glider does not fly backwards. A compass, or a bent wing, that turns the way by more than a radian (its
+sine) is not thought of."""
 RARE = 1e-3
 """Weight of a mode below which it is left out of the mixture."""
 
@@ -36,11 +37,11 @@ RARE = 1e-3
 class JointParams:
     """What is known before any dive.
 
-    ``modes`` are how a dive can be explained; ``speed``, ``speed_sigma`` of W (m/s) and ``speed_wander`` its usual change in 3 h; ``slip`` the part of
-    the physical slip that is real (on board some is allowed for: a DAC is 5 to 10 % of W off), with
-    ``slip_sigma`` its standard error as part of W, ``side_sigma`` that of side (rad), ``slip_memory`` (s) of both;
-    ``own_noise`` the error of W on a dive as part of it; ``front`` (m/s) by how
-    much the flow may change together with a step; ``alarms_per_month`` of the test for a step.
+    ``modes`` are how a dive can be explained; ``speed``, ``speed_sigma`` of W (m/s) and ``speed_wander`` its
+    usual change in 3 h; ``slip`` the part of the physical slip that is real (on board some is allowed for: a
+    DAC is 5 to 10 % of W off), with ``slip_sigma`` its standard error as part of W, ``side_sigma`` that of
+    side (rad), ``slip_memory`` (s) of both; ``own_noise`` the error of W on a dive as part of it; ``front``
+    (m/s) by how much the flow may change together with a step; ``alarms_per_month`` of the test for a step.
     """
 
     flow: FlowParams = FlowParams()
@@ -64,8 +65,8 @@ class JointState:
     ``t`` end of the last dive (s), ``x`` ((n,)) and ``cov`` ((n, n)) of the state; ``sea`` factor on the
     variance of the flow's changes and ``doubt`` on that of the measurements, both learnt; ``dives`` used;
     ``bank`` of the test for a step; ``nis`` and ``dof``, sums of the normalised innovations squared and
-    of their degrees of freedom on usual dives; ``end`` the fix that ended the last dive; ``wrong`` how likely each of
-    its measurements was wrong.
+    of their degrees of freedom on usual dives; ``end`` the fix that ended the last dive; ``wrong`` how
+    likely each of its measurements was wrong.
     """
 
     t: float
@@ -161,7 +162,10 @@ def step(
     shown, jumped = state.cov[-SHOWN:, -SHOWN:], steps[-SHOWN:] @ steps[-SHOWN:].T
     modes = switched(params.modes, state.wrong)
     ways = explain(state.x[-SHOWN:], shown, jumped, measured, (*modes, *((ROLLED,) if hint else ())))
-    odds = {str(cause): sum(w.weight for w in ways if w.cause is cause) for cause in dict.fromkeys(w.cause for w in ways)}
+    odds = {
+        str(cause): sum(w.weight for w in ways if w.cause is cause)
+        for cause in dict.fromkeys(w.cause for w in ways)
+    }
     cause = max(odds, key=lambda each: odds[each])
     best = max((w for w in ways if str(w.cause) == cause), key=lambda way: way.weight)
     believed = seen.own_speed()
@@ -222,9 +226,7 @@ def _jump(params: FlowParams) -> Array:
     return np.concatenate([flow.jump(params), np.zeros((3, 2))])
 
 
-def _predicted(
-    state: JointState, seen: Observation, passage: Passage, params: JointParams
-) -> JointState:
+def _predicted(state: JointState, seen: Observation, passage: Passage, params: JointParams) -> JointState:
     """The state at the end of a dive, before what it measures."""
     dt = max(seen.end - state.t, 0.0)
     matrix, n = passage_matrix(passage), params.flow.size
@@ -278,9 +280,7 @@ def _mixed(state: JointState, ways: list[Explained], steps: Array) -> JointState
         covs.append(cov - update.gain @ (update.rows @ cov))
     weights = np.array([way.weight / total for way in kept])
     x = weights @ np.array(means)
-    cov = sum(
-        w * (c + np.outer(m - x, m - x)) for w, c, m in zip(weights.tolist(), covs, means, strict=True)
-    )
+    cov = sum(w * (c + np.outer(m - x, m - x)) for w, c, m in zip(weights.tolist(), covs, means, strict=True))
     cov = np.asarray(cov)
     return replace(state, x=readonly(_bounded(x)), cov=readonly((cov + cov.T) / 2))
 
@@ -305,7 +305,9 @@ def _learnt(
     usual = next((w for w in ways if w.cause is Cause.USUAL and w.believes == best.believes), None)
     square, share = None, 0.0
     if usual is not None and best.cause in (Cause.USUAL, Cause.FLOW) and state.dives:
-        at = slice(2, 4) if len(usual.innovation) > 3 else slice(0, 2)  # the current, else the ground velocity
+        at = (
+            slice(2, 4) if len(usual.innovation) > 3 else slice(0, 2)
+        )  # the current, else the ground velocity
         rows, e = usual.rows[at], usual.innovation[at]
         s = rows @ state.cov[-SHOWN:, -SHOWN:] @ rows.T + usual.noise[at, at]
         inverse = np.linalg.inv(s)

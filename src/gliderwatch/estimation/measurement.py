@@ -1,8 +1,8 @@
 """What one dive measures, as an explicit function of the state. Pure.
 
-Of the state a dive shows five numbers: the mean flow F over it (east, north), the speed W that the glider reckons
-with, and slip s and side d, by which its real way through the water differs from that. With h the mean heading vector
-and h' that vector turned left it measures
+Of the state a dive shows five numbers: the mean flow F over it (east, north), the speed W that the glider
+reckons with, and slip s and side d, by which its real way through the water differs from that. With h the
+mean heading vector and h' that vector turned left it measures
 
     g = F + W ((1 - s) h - d h')        ground velocity
     c = F - W (s h + d h')              depth-averaged current, so that g - c = W h
@@ -33,8 +33,8 @@ DRAG_SLIP = 0.9
 
 @dataclass(frozen=True, slots=True)
 class Slipping:
-    """What is known of slip beside the state: of ``physics`` (part of W), ``noise`` of it on one dive, and the
-    ``usual`` speed through the water (m/s, None: not known) below which drag adds to it."""
+    """What is known of slip beside the state: of ``physics`` (part of W), ``noise`` of it on one dive, and
+    the ``usual`` speed through the water (m/s, None: not known) below which drag adds to it."""
 
     physics: float
     noise: float
@@ -43,7 +43,8 @@ class Slipping:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """The measurements of a dive: ``values`` ((m,)): g (2), c (2, where there is ``current``), w (1, where it ``tells``)."""
+    """The measurements of a dive: ``values`` ((m,)): g (2), c (2, where there is ``current``), w (1, where
+    it ``tells``)."""
 
     seen: Observation
     tells: Reckoned | None
@@ -67,7 +68,8 @@ class Measured:
 
 
 def drag_slip(speed: Array, usual: float | None) -> Array:
-    """The slip that drag adds on a glider slower than usual (m/s), parts of W; half of it is its standard error.
+    """The slip that drag adds on a glider slower than usual (m/s), parts of W; half of it is its standard
+    error.
 
     More drag at the same pitch needs more lift, so a larger angle of attack. With the flight model of
     Merckelbach et al. (2019) slip rises by 1.5 (1 - speed / usual)^2 where drag alone slows a Slocum,

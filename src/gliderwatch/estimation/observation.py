@@ -59,8 +59,8 @@ class Observation:
     ``ground_cov`` ((2, 2)) but for what is wrong with the heading; ``heading`` h ((2,)) with covariance
     ``heading_cov`` ((2, 2)); ``current`` c (m/s, (2,), None: not reported) with standard error
     ``current_sigma`` a component; ``slip`` the part of W that an angle of attack takes, by physics;
-    ``unseen`` the part of the flight within gaps between headings. ``is_free``: no heading was measured, so that its
-    direction is that of g - c and nothing is told by what is across.
+    ``unseen`` the part of the flight within gaps between headings. ``is_free``: no heading was measured, so
+    that its direction is that of g - c and nothing is told by what is across.
     """
 
     start: float
@@ -129,7 +129,12 @@ def observe(dive: Dive) -> Observation:
         ground_cov=readonly((2 * (GPS / interval) ** 2 + ((1 - flown) * SURFACE_FLOW) ** 2) * np.eye(2)),
         heading=readonly(share @ vectors),
         heading_cov=readonly(
-            (_missing(dive, interval, flown) if _is_free(dive) else _heading_cov(vectors, share, dive, interval)) + spread
+            (
+                _missing(dive, interval, flown)
+                if _is_free(dive)
+                else _heading_cov(vectors, share, dive, interval)
+            )
+            + spread
         ),
         is_free=_is_free(dive),
         current=None if current is None else readonly([current.u, current.v]),
@@ -164,9 +169,10 @@ def is_unmeasured(dive: Dive) -> bool:
 def _directed(vectors: Array, velocities: Array, share: Array, dive: Dive) -> tuple[Array, Array]:
     """The heading vectors where none were measured, and what that adds to the covariance of their mean.
 
-    The glider reckons with its compass, so that g - c = W h holds with the heading that nobody sent. Its dead-reckoned
-    way, drawn to the fixes, has the ``velocities`` (m/s, (k, 2)) over ground: less the current these are W times the
-    headings, whatever current the glider had put into its way. With nothing at all the course is taken for that of a leg.
+    The glider reckons with its compass, so that g - c = W h holds with the heading that nobody sent. Its
+    dead-reckoned way, drawn to the fixes, has the ``velocities`` (m/s, (k, 2)) over ground: less the current
+    these are W times the headings, whatever current the glider had put into its way. With nothing at all the
+    course is taken for that of a leg.
     """
     none = np.zeros((2, 2))
     reckoned, commanded = dive.features.heading_reckoned, dive.features.heading_commanded > 0
@@ -213,7 +219,8 @@ def _heading_cov(vectors: Array, share: Array, dive: Dive, interval: float) -> A
 
 
 def _missing(dive: Dive, interval: float, flown: float) -> Array:
-    """Covariance of the mean heading vector by hours of which no data came, and by the compass on a part ``flown``."""
+    """Covariance of the mean heading vector by hours of which no data came, and by the compass on a part
+    ``flown``."""
     missing = UNSEEN * (dive.features.unobserved / 3600) * 3600 / interval
     return np.asarray((missing**2 + (COMPASS * flown) ** 2) * np.eye(2))
 

@@ -30,7 +30,8 @@ OWN_SURE = 0.15
 """Standard error of W on a dive, as part of it, up to which the dive tells what W is to what is reported."""
 NOT_SEEN = "it turned, and its heading is not in the file: the speed cannot be told"
 ROLL_CONFIRMS = 0.67
-"""Standard errors by which a speed must be below normal where the glider rolls otherwise for two dives: three to one."""
+"""Standard errors by which a speed must be below normal where the glider rolls otherwise for two dives:
+three to one."""
 FASTER = "faster than ever: the current is wrong, or it is driven harder"
 HIDDEN = 0.1
 """Part of the speed that the glider believes, by which it must be slower to be slower than that."""
@@ -76,8 +77,8 @@ class SpeedState:
     ``joint`` estimate (None: no dive yet), ``normal`` speeds learnt, ``rolls`` (rad) of the first healthy
     dives, ``rolled`` dives in a row that roll otherwise, ``slow`` Page's sum of small losses, ``doubted``
     slow dives in a row that were not believed, ``misfits`` of the last dives, ``ratios`` of the speed to
-    what the glider tells of it; ``trim`` of the last normal dive, ``other`` speeds (m/s) of the last dives in a row that
-    may be a new way of flying.
+    what the glider tells of it; ``trim`` of the last normal dive, ``other`` speeds (m/s) of the last dives
+    in a row that may be a new way of flying.
     """
 
     joint: JointState | None = None
@@ -150,8 +151,8 @@ def _regime(
 ) -> tuple[SpeedState, Flag | None, str, SpeedRange]:
     """What is said of a dive out of its range that may be flown in a new way, and the state with that.
 
-    A faster glider is no fault: three dives at one speed, which depth rate and pitch do not deny, are a new way of
-    flying with a range of its own. A slower one is that only where the pilot changed pitch or ballast.
+    A faster glider is no fault: three dives at one speed, which depth rate and pitch do not deny, are a new
+    way of flying with a range of its own. A slower one is that only where the pilot changed pitch or ballast.
     """
     speed, learning = info.estimate.speed, params.learning
     faster = reason == FASTER
@@ -163,13 +164,16 @@ def _regime(
         return replace(state, other=()), flag, reason, normal
     row = (*(each for each in state.other if abs(each / speed - 1) < AGREE), speed)
     if len(row) < ENOUGH:
-        words = f"{'faster' if faster else 'slower'} than before: a new way of flying, or the current is wrong"
+        words = (
+            f"{'faster' if faster else 'slower'} than before: a new way of flying, or the current is wrong"
+        )
         return replace(state, other=row), None, f"{words}: the next dives will tell", normal
     at = setting(dive.features)
     state = replace(state, normal=renewed(state.normal, row, at), other=(), slow=0.0, doubted=0)
     new = speed_range(state.normal, at, learning) or normal
-    words = f"flies {'faster' if faster else 'slower'} since {ENOUGH - 1} dives ago: {speed:.2f} m/s is its new normal speed"
-    return state, Flag.NORMAL, f"{words}, unless you say otherwise", new
+    words = f"flies {'faster' if faster else 'slower'} since {ENOUGH - 1} dives ago"
+    words += f": {speed:.2f} m/s is its new normal speed, unless you say otherwise"
+    return state, Flag.NORMAL, words, new
 
 
 def _trim(dive: Dive) -> Trim:
@@ -180,8 +184,8 @@ def _trim(dive: Dive) -> Trim:
 def retrimmed(before: Trim, now: Trim) -> bool:
     """Whether the pilot changed pitch or ballast between two dives.
 
-    >>> retrimmed((-0.45, 0.45, None, None), (-0.35, 0.36, None, None)), retrimmed((), (-0.45, 0.45, None, None))
-    (True, False)
+    >>> retrimmed((-0.45, 0.45, None, None), (-0.35, 0.36, None, None)), retrimmed((), (-0.45, 0.45, None,
+    None)) (True, False)
     """
     pairs = zip(before, now, RETRIMMED, strict=False)
     return any(a is not None and b is not None and abs(a - b) > least for a, b, least in pairs)
@@ -201,15 +205,11 @@ def _wrong(state: SpeedState, info: JointInfo, params: SpeedParams) -> tuple[Fla
         return None, "no depth-averaged current"
     if info.across is not None and disagrees(state.misfits[-1], params.gate, params.least):
         return Flag.FALSE_ALARM, str(blame(state.misfits, params.gate, params.least))
-    if info.cause is Cause.CURRENT:
-        return Flag.FALSE_ALARM, "the current does not fit those before, the ground velocity does"
     if info.cause is Cause.GROUND and info.seen.is_free:
         return None, NOT_SEEN
-    if info.cause is Cause.GROUND:
-        return (
-            Flag.FALSE_ALARM,
-            "the ground velocity does not fit, the current does: fixes or headings are wrong",
-        )
+    words = next((mode.words for mode in params.joint.modes if mode.cause is info.cause and mode.words), "")
+    if words:
+        return Flag.FALSE_ALARM, words
     side, sigma = info.estimate.side
     if abs(side) > max(params.turned, 3 * sigma):
         return Flag.FALSE_ALARM, f"the compass seems to be off by {degrees(abs(side)):.0f} degrees"
@@ -294,7 +294,9 @@ def _small_losses(
     return state, Flag.NORMAL, ""
 
 
-def _how_slow(info: JointInfo, normal: SpeedRange, params: SpeedParams, words: str = "slower than normal") -> str:
+def _how_slow(
+    info: JointInfo, normal: SpeedRange, params: SpeedParams, words: str = "slower than normal"
+) -> str:
     """Words for a speed below normal: that of the glider itself is, or it does not know of it."""
     believed = info.estimate.own_speed * (1 - params.joint.slip * info.seen.slip)
     hidden = believed - info.estimate.speed > HIDDEN * believed

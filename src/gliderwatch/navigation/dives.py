@@ -36,9 +36,10 @@ class Navigation:
     ``fix`` is the last good one and ``carry`` the samples after it; ``declination`` (rad) the last known,
     ``declination_t`` when the glider told it (s; None: a model's); ``last_t`` the end of the
     latest segment (s); ``holes`` the times (start, end) since the fix of which no segment has come;
-    ``calls`` those between two segments that follow each other, in which none is missing, and ``last_name`` the name of
-    the latest segment if it holds a whole flight and ends at the surface (else empty: it may break off); ``holder`` the segment that holds the flight since the fix; ``known`` the currents reported last and
-    ``reports`` those whose dive is not told yet; ``dive`` the last whole dive, ``untold`` the
+    ``calls`` those between two segments that follow each other, in which none is missing, and ``last_name``
+    the name of the latest segment if it holds a whole flight and ends at the surface (else empty: it may
+    break off); ``holder`` the segment that holds the flight since the fix; ``known`` the currents reported
+    last and ``reports`` those whose dive is not told yet; ``dive`` the last whole dive, ``untold`` the
     surfacing (s) of a later one that is not told; ``notes`` on the data since the fix.
     """
 
@@ -137,7 +138,8 @@ def _placed(state: Navigation, segment: Segment, fresh: Samples, quality: tuple[
 
 
 def follows(before: str, name: str) -> bool:
-    """Whether a segment is the next one of the same mission after another, so that none is missing between them.
+    """Whether a segment is the next one of the same mission after another, so that none is missing between
+    them.
 
     >>> follows("unit-2024-120-3-7", "unit-2024-120-3-8"), follows("unit-2024-120-3-7", "unit-2024-120-3-9")
     (True, False)
@@ -229,9 +231,9 @@ def _with_currents(
 ) -> tuple[list[Dive], list[Report]]:
     """The dives with the currents published for them, and the reports of a dive that is not told yet.
 
-    `untold` are surfacings (s) of dives that are never told: their currents are nobody's. One that was published well
-    within a flight is that of a part of it, up to a surfacing without a fix: so is then the one at its end, and neither
-    is the current between the two fixes.
+    `untold` are surfacings (s) of dives that are never told: their currents are nobody's. One that was
+    published well within a flight is that of a part of it, up to a surfacing without a fix: so is then the
+    one at its end, and neither is the current between the two fixes.
     """
     flights = [(d.t_dive, d.t_surface, i) for i, d in enumerate(told)]
     if under_way is not None:
@@ -251,7 +253,11 @@ def _with_currents(
         i = ends[k][1] if 0 <= k < len(ends) else None
         if k == len(ends):
             waiting.append(report)
-        elif i is not None and out[i].unusable is not Unusable.STALE_FIX and not out[i].features.surfacing_unseen:
+        elif (
+            i is not None
+            and out[i].unusable is not Unusable.STALE_FIX
+            and not out[i].features.surfacing_unseen
+        ):
             out[i] = replace(out[i], current=updated(out[i].current, report, out[i].t_surface))
     return out, waiting
 

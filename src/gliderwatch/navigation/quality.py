@@ -45,13 +45,14 @@ def why_unusable(
 
 
 def _blind(samples: Samples, flight: Flight) -> tuple[Unusable | None, str]:
-    """Why the headings of a flight do not do, and the same in words; None and empty when they do, or when depth or
-    pitch tell how fast it was."""
+    """Why the headings of a flight do not do, and the same in words; None and empty when they do, or when
+    depth or pitch tell how fast it was."""
     return (None, "") if flight.evidence.startswith(("depth", "pitch")) else unsteered(samples, flight)
 
 
 def unsteered(samples: Samples, flight: Flight) -> tuple[Unusable | None, str]:
-    """Why the course of a flight is not known from its headings, and the same in words; None and empty when it is."""
+    """Why the course of a flight is not known from its headings, and the same in words; None and empty when
+    it is."""
     gap = heading_gap(samples, flight)
     if gap > BLIND * flight.duration:
         return Unusable.NO_HEADING, f"no heading for {gap / 3600:.1f} h"

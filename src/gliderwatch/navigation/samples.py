@@ -107,7 +107,8 @@ def prepare(segment: Segment, declination: float) -> Samples:
 
 
 def _reckoned(samples: Mapping[str, Series]) -> tuple[Array, NDArray[np.float64]]:
-    """Directions of the dead-reckoned way, for files without headings: times in the middle of steps, unit vectors.
+    """Directions of the dead-reckoned way, for files without headings: times in the middle of steps, unit
+    vectors.
 
     Steps to a fix, at the surface, are faster than any flight, or none at all.
     """

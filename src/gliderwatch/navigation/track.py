@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gliderwatch.model import Array, Current, Fix, Track, readonly
+from gliderwatch.model import Array, Current, Fix, Series, Track, readonly
 from gliderwatch.navigation.fixes import FASTEST
 from gliderwatch.navigation.flight import SPARSE, Flight
 from gliderwatch.navigation.frame import to_plane
@@ -43,13 +43,13 @@ def build_track(samples: Samples, flight: Flight, start: Fix, end: Fix) -> Track
 def _headings(samples: Samples, t: Array, flight: Flight, moved: Array) -> Array:
     """Unit vectors between successive times of `t`, zero outside the flight.
 
-    Where no heading is known at all the course is taken for steady, along the way over ground ``moved`` (m, (2,)):
-    the estimator puts its own direction in place of that.
+    Where no heading is known at all the course is taken for steady, along the way over ground ``moved`` (m,
+    (2,)): the estimator puts its own direction in place of that.
     """
     middle = (t[1:] + t[:-1]) / 2
     if not len(get(samples, "heading_e").between(flight.start, flight.end)):
-        length = float(np.hypot(*moved))
-        course = moved / length if length > 1.0 else np.array([1.0, 0.0])
+        way = float(np.hypot(*moved))
+        course = moved / way if way > 1.0 else np.array([1.0, 0.0])
         flown = (middle >= flight.start) & (middle <= flight.end)
         return np.asarray(np.where(flown[:, None], course, 0.0))
     e, n = get(samples, "heading_e").between(flight.start, flight.end), get(samples, "heading_n")

@@ -22,8 +22,8 @@ from gliderwatch.rules.unknown import Unknown
 NEWS = 86400.0
 """Seconds: an incident that was over for longer when it became known is history, not news."""
 MARKS, WEEK, SLACK = (1.0, 2.0, 4.0, 7.0), 7.0, 0.2
-"""Days after which an open incident is brought to mind, and then each week; how much of a day sooner after the message
-before one may come, because surfacings do not fall on full days."""
+"""Days after which an open incident is brought to mind, and then each week; how much of a day sooner after
+the message before one may come, because surfacings do not fall on full days."""
 SPEED_CHANGE = 0.05
 """m/s: a smaller change of a speed that was told is not worth a correction."""
 FLOW_CHANGE = 0.05
@@ -240,8 +240,8 @@ def _continued(
 
 
 def next_reminder(age: float) -> float:
-    """The age (days, or what is set in their place) at which an incident is brought to mind that was last told of at
-    an ``age``: at 1, 2, 4 and 7 days, then each week, and never within a day of that.
+    """The age (days, or what is set in their place) at which an incident is brought to mind that was last
+    told of at an ``age``: at 1, 2, 4 and 7 days, then each week, and never within a day of that.
 
     >>> [next_reminder(age) for age in (0.0, 0.5, 1.0, 2.1, 4.2, 7.0)]
     [1.0, 2.0, 2.0, 4.0, 7.0, 14.0]

@@ -90,7 +90,7 @@ def judge(state: Watches, dive: Assessment, rules: RuleParams) -> tuple[Watches,
     anomaly, first = _watch(state.anomaly, dive, Kind.ANOMALY, _says_of_anomaly(dive, is_open), rules.anomaly)
     before = state.false_alarm
     if anomaly.incident is not None:
-        # one fault is one incident: that the glider itself is slow explains what was taken for a wrong measurement
+        # one fault is one incident: a slow glider explains what was taken for a wrong measurement
         over = () if before.incident is None else (replace(before.incident, cleared_at=dive.t_surface),)
         return Watches(anomaly, Watch()), first + over
     false_alarm, second = _watch(
@@ -100,8 +100,8 @@ def judge(state: Watches, dive: Assessment, rules: RuleParams) -> tuple[Watches,
 
 
 def _says_of_anomaly(dive: Assessment, is_open: bool) -> bool | None:
-    """Whether a dive is flagged (None: it says neither). An open anomaly is cleared by dives near the usual speed: one
-    just inside the bound is not well again."""
+    """Whether a dive is flagged (None: it says neither). An open anomaly is cleared by dives near the usual
+    speed: one just inside the bound is not well again."""
     if dive.flag == Flag.FALSE_ALARM:
         return None
     usual, speed = dive.evidence.get("usual_speed"), dive.speed

@@ -7,8 +7,8 @@ the glider comes up, how deep it goes, how fast it flies, which sensors it sends
 
 Ranges: M2 of shelf seas up to 0.7 m/s, S2 a quarter to a half of it and N2 a fifth (Pugh and Woodworth
 2014, Sea-Level Science); K1 and O1 of 0.3 to 0.4 m/s on shelves whose tide is diurnal; near-inertial
-motion of 0.1 to 0.3 m/s after storms (Alford et al. 2016, Annu. Rev. Mar. Sci. 8, 95-123); the wandering part of
-depth-averaged currents 4 to 8 cm/s a component in the open sea, more on shelves under wind. Inertial
+motion of 0.1 to 0.3 m/s after storms (Alford et al. 2016, Annu. Rev. Mar. Sci. 8, 95-123); the wandering
+part of depth-averaged currents 4 to 8 cm/s a component in the open sea, more on shelves under wind. Inertial
 motion has the period of M2 at 74.5 degrees of latitude, of K1 at 30.
 """
 
@@ -47,8 +47,8 @@ class SeaKind:
 
     ``m2``, ``k1`` (m/s) are major axes, ``m2_ratio``, ``k1_ratio`` minor by major axis; ``mean`` and
     ``sigma`` (m/s) the lasting and the wandering current, ``memory`` (h) and ``size`` (km) of the latter;
-    ``inertial`` and ``front`` (m/s); ``latitude`` (degrees), of either hemisphere if ``both``; ``depth`` (m) of the
-    lower turn, ``hours`` from surfacing to surfacing. ``shelf`` says that the bottom is within reach.
+    ``inertial`` and ``front`` (m/s); ``latitude`` (degrees), of either hemisphere if ``both``; ``depth`` (m)
+    of the lower turn, ``hours`` from surfacing to surfacing. ``shelf`` says that the bottom is within reach.
     """
 
     about: str

@@ -75,8 +75,9 @@ def typed_dives(state: Any) -> Any:
 def one_sea(state: Any) -> Any:
     """Layout 2 to 3: the joint estimate has one model of the sea, with its time at the end of the last dive.
 
-    The speed W, slip and side (the last three numbers of its state) stay, with their covariances, and all that is known
-    of normal; the flow is to be learnt again, which takes a day, and so are hypotheses of a step.
+    The speed W, slip and side (the last three numbers of its state) stay, with their covariances, and all
+    that is known of normal; the flow is to be learnt again, which takes a day, and so are hypotheses of a
+    step.
     """
     for memory in (state["settled"], state["memory"]):
         speed = memory["estimate"]["joint"]["speed"]
