@@ -50,10 +50,10 @@ class JointParams:
     speed_sigma: float = 0.2
     speed_wander: float = 0.015
     slip: float = 0.75
-    slip_sigma: float = 0.025
+    slip_sigma: float = 0.018
     side_sigma: float = 0.03
     slip_memory: float = 30 * 86400.0
-    own_noise: float = 0.02
+    own_noise: float = 0.01
     front: float = 0.25
     alarms_per_month: float = 0.05
 
