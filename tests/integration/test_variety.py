@@ -78,7 +78,9 @@ def test_a_commanded_heading_that_is_not_flown_is_no_false_alarm(tmp_path: Path)
 
 def without(segments: Sequence[Segment], *names: str) -> list[Segment]:
     """The segments without some quantities."""
-    return [replace(s, quantities={n: q for n, q in s.quantities.items() if n not in names}) for s in segments]
+    return [
+        replace(s, quantities={n: q for n, q in s.quantities.items() if n not in names}) for s in segments
+    ]
 
 
 @pytest.mark.parametrize(

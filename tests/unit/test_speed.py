@@ -177,7 +177,7 @@ def test_a_faster_glider_is_flown_in_a_new_way():
     made = [w if k < 15 else replace(w, speed=2 * w.speed, own=2 * w.own) for k, w in enumerate(made)]
     _, verdicts = run(mission(made))
     assert flags(verdicts[15:18]) == [None, None, Flag.NORMAL]
-    assert "new normal speed" in verdicts[17].reason
+    assert "flies in a new way" in verdicts[17].reason
     assert set(flags(verdicts[18:])) == {Flag.NORMAL}
     assert verdicts[20].normal.usual == pytest.approx(0.46, abs=0.03)
     slowed = [w if k < 25 else slower(w, 0.4) for k, w in enumerate(made)]

@@ -33,6 +33,8 @@ ROLL_CONFIRMS = 0.67
 """Standard errors by which a speed must be below normal where the glider rolls otherwise for two dives:
 three to one."""
 FASTER = "faster than ever: the current is wrong, or it is driven harder"
+NEW_FASTER = "faster than before: a new way of flying, or the current is wrong: the next dives will tell"
+NEW_SLOWER = "slower than before, after a change of pitch or ballast: the next dives will tell"
 HIDDEN = 0.1
 """Part of the speed that the glider believes, by which it must be slower to be slower than that."""
 ROLLED, ROLLS = 0.12, 5
@@ -164,15 +166,12 @@ def _regime(
         return replace(state, other=()), flag, reason, normal
     row = (*(each for each in state.other if abs(each / speed - 1) < AGREE), speed)
     if len(row) < ENOUGH:
-        words = (
-            f"{'faster' if faster else 'slower'} than before: a new way of flying, or the current is wrong"
-        )
-        return replace(state, other=row), None, f"{words}: the next dives will tell", normal
+        return replace(state, other=row), None, NEW_FASTER if faster else NEW_SLOWER, normal
     at = setting(dive.features)
     state = replace(state, normal=renewed(state.normal, row, at), other=(), slow=0.0, doubted=0)
     new = speed_range(state.normal, at, learning) or normal
-    words = f"flies {'faster' if faster else 'slower'} since {ENOUGH - 1} dives ago"
-    words += f": {speed:.2f} m/s is its new normal speed, unless you say otherwise"
+    words = f"flies in a new way for three dives: {speed:.2f} m/s is its normal speed now, "
+    words += "unless you say otherwise"
     return state, Flag.NORMAL, words, new
 
 
