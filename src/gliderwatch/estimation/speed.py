@@ -98,12 +98,14 @@ class SpeedState:
 @dataclass(frozen=True, slots=True)
 class Verdict:
     """What a dive says: ``flag`` (None: nothing) with the ``reason`` in words, the ``normal`` range used, and
-    what was found (``info``, None: the dive has no track)."""
+    what was found (``info``, None: the dive has no track). ``by_reckoning``: the speed through the water (m/s) and
+    its standard error by depth rate and pitch, where these alone decided."""
 
     flag: Flag | None
     reason: str
     normal: SpeedRange
     info: JointInfo | None
+    by_reckoning: tuple[float, float] | None = None
 
 
 def step(
@@ -135,6 +137,9 @@ def step(
     if (flag is None and info.seen.is_free) or assumed:
         reason = NOT_SEEN if assumed else reason
         flag, reason = _by_reckoning(reason, state, told, normal, params)
+        if flag is not None and told is not None:
+            left = 1 - _usual_slip(params)
+            return state, Verdict(flag, reason, normal, info, (told.speed * left, told.sigma * left))
     state, flag, reason, normal = _regime(state, dive, info, told, normal, flag, reason, params)
     if flag is Flag.NORMAL and not frozen:
         state = replace(_learnt(state, dive, info, at, params), trim=_trim(dive))
