@@ -30,6 +30,8 @@ COMMANDED = 0.08
 are sent: 0.04 to 0.09 on the four missions that have both (robust standard deviations)."""
 LIKELY, ASSUMED = 0.92, 0.2
 """Usual length of the mean heading vector of a dive whose headings are not known, and its standard error."""
+STRAIGHT, TURNING = 0.9, 0.5
+"""Length of the mean of the few headings there are, below which it turned, and the standard error then."""
 STEERED = 0.1
 """The same error where the commanded headings tell the length."""
 SHAPE = 0.03
@@ -189,12 +191,15 @@ def _directed(vectors: Array, velocities: Array, share: Array, dive: Dive) -> tu
     if rest < 1e-3:
         return vectors, np.asarray(flown**2 * np.eye(2))
     along = mean / rest
+    seen = float(np.hypot(*(share @ vectors))) / flown
     if reckoned:
         speeds = np.hypot(*through.T)
-        length = rest / max(float(share @ speeds) / flown, rest)
+        length, error = rest / max(float(share @ speeds) / flown, rest), SHAPE
+    elif commanded:
+        length, error = seen, STEERED
     else:
-        length = float(np.hypot(*(share @ vectors))) / flown if commanded else LIKELY
-    error = flown * (SHAPE if reckoned else STEERED if commanded else ASSUMED)
+        length, error = LIKELY * seen, ASSUMED if seen > STRAIGHT else TURNING
+    error *= flown
     return np.tile(length * along, (len(vectors), 1)), np.asarray(error**2 * np.outer(along, along))
 
 
