@@ -196,7 +196,7 @@ def _directed(vectors: Array, velocities: Array, share: Array, dive: Dive) -> tu
         speeds = np.hypot(*through.T)
         length, error = rest / max(float(share @ speeds) / flown, rest), SHAPE
     elif commanded:
-        length, error = seen, STEERED
+        length, error = seen, STEERED if seen > STRAIGHT else TURNING
     else:
         length, error = LIKELY * seen, ASSUMED if seen > STRAIGHT else TURNING
     error *= flown
