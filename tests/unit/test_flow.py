@@ -35,7 +35,8 @@ def learnt(x, cov, went: Passage, current, params, noise):
 
 
 def test_numbers_of_the_augmented_filter():
-    """A residual of 0.08 m/s and 30 h and M2 that wanders, on three dives: innovations, and the next displacement."""
+    """A residual of 0.08 m/s and 30 h and M2 that wanders, on three dives: innovations, and the next
+    displacement."""
     params = FlowParams(passing=0.08, memory=30 * HOUR, tides=(Tide(M2, 0.5 / math.sqrt(2)),))
     q = np.array([0.0, 2 * 0.08**2 / (30 * HOUR), 0.0, *[1e-6 / HOUR / 2] * 2])
     variance = prior(params)

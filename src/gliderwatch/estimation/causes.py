@@ -19,7 +19,7 @@ import numpy as np
 from gliderwatch.estimation.measurement import FASTEST, OWN, SIDE, SLIP, Measured, expected
 from gliderwatch.model import Array
 
-ITERATIONS = 3
+ITERATIONS = 2
 BEYOND = 0.02
 """m/s by which a speed may be found beyond what a glider can fly, before that speaks against an
 explanation."""

@@ -98,8 +98,8 @@ class SpeedState:
 @dataclass(frozen=True, slots=True)
 class Verdict:
     """What a dive says: ``flag`` (None: nothing) with the ``reason`` in words, the ``normal`` range used, and
-    what was found (``info``, None: the dive has no track). ``by_reckoning``: the speed through the water (m/s) and
-    its standard error by depth rate and pitch, where these alone decided."""
+    what was found (``info``, None: the dive has no track). ``by_reckoning``: the speed through the water
+    (m/s) and its standard error by depth rate and pitch, where these alone decided."""
 
     flag: Flag | None
     reason: str
