@@ -171,8 +171,8 @@ def test_the_first_dives_are_kept_and_the_latest() -> None:
     assert rolls.round().tolist() == [*range(12), *range(48, 60)]
 
 
-# Usable dives after the first 12 h of which a number points to the glider; there are 42, 24, 12, 3 and 9. In its last
-# day george-2024 flies spirals, rolled by 10 degrees, and tells few headings.
+# Usable dives after the first 12 h of which a number points to the glider; there are 42, 24, 12, 3 and 9.
+# In its last day george-2024 flies spirals, rolled by 10 degrees, and tells few headings.
 @pytest.mark.real
 @pytest.mark.parametrize(
     ("name", "most"),

@@ -149,9 +149,9 @@ def explain(
     weights = np.exp(logs - logs.max())
     weights /= weights.sum()
     left_out = wrong > 0
-    left_out[:, -1, -1] &= tells is None
     noise = np.where(left_out, LEFT_OUT**2, noise)
-    inverse = np.linalg.inv(slope @ turned + noise)
+    at = np.flatnonzero(left_out.any(axis=(1, 2)))
+    inverse[at] = np.linalg.inv(slope[at] @ turned[at] + noise[at])
     return [
         Explained(
             mode.cause, mode.size, float(weights[k]), believes, slope[k], innovation[k], noise[k], inverse[k]

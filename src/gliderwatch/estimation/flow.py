@@ -20,12 +20,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gliderwatch.currents.constituents import Constituent
-from gliderwatch.model import Array
+from gliderwatch.model import Array, readonly
 
 HOUR, DAY = 3600.0, 86400.0
 EARTH = 7.292115e-5
@@ -145,23 +147,24 @@ def passage(gap: float, dive: float, lat: float, q: Array, params: FlowParams) -
     phi, integral = np.exp(a * dive), _integral(a, dive)
     mean, cross, own = integral / dive, *_wandered(a, dive)
     n, m = params.size, params.parts
-    matrix, noise = np.zeros((n, n)), np.zeros((n, n))
-    _put(matrix, phi * kept, range(m), range(m))
-    _put(matrix, mean * kept, [m] * m, range(m))
-    _put(noise, q * _squared(a, dive) + gained * np.abs(phi) ** 2, range(m), range(m))
+    matrix, noise, each = np.zeros((n, n)), np.zeros((n, n)), np.arange(m)
+    _put(matrix, phi * kept, each, each)
+    _put(matrix, mean * kept, m, each)
+    _put(noise, q * _squared(a, dive) + gained * np.abs(phi) ** 2, each, each)
     shared = q * cross / dive + gained * mean * np.conj(phi)
-    _put(noise, shared, [m] * m, range(m))
-    _put(noise, np.conj(shared), range(m), [m] * m)
+    _put(noise, shared, m, each)
+    _put(noise, np.conj(shared), each, m)
     new = q * own / dive**2 + gained * np.abs(mean) ** 2
-    _put(noise, np.array([new.sum()]), [m], [m])
+    _put(noise, new.sum(), m, m)
     return Passage(matrix, noise, float(new[:FIXED].sum()))
 
 
+@cache
 def jump(params: FlowParams) -> Array:
     """What a step of the lasting part before a dive does to the state, (size, 2): east and north."""
     out = np.zeros((params.size, 2))
     out[LASTING] = out[params.mean] = np.eye(2)
-    return out
+    return readonly(out)
 
 
 def crossing(flow: Array, ground: Array, dt: float, params: FlowParams) -> float:
@@ -193,10 +196,12 @@ def _wandered(a: Complex, t: float) -> tuple[Complex, Array]:
     return cross, own
 
 
-def _put(matrix: Array, values: Complex | Array, rows: object, columns: object) -> None:
+def _put(matrix: Array, values: Any, rows: Any, columns: Any) -> None:
     """Add complex factors as real blocks of two by two at pairs of places."""
-    i, j = 2 * np.asarray(rows), 2 * np.asarray(columns)
-    matrix[i, j] += values.real
-    matrix[i + 1, j + 1] += values.real
-    matrix[i + 1, j] += values.imag
-    matrix[i, j + 1] -= values.imag
+    blocks = matrix.reshape(len(matrix) // 2, 2, -1, 2)
+    values, real = np.asarray(values), np.real(values)
+    blocks[rows, 0, columns, 0] += real
+    blocks[rows, 1, columns, 1] += real
+    if np.iscomplexobj(values):
+        blocks[rows, 1, columns, 0] += values.imag
+        blocks[rows, 0, columns, 1] -= values.imag

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
@@ -221,9 +222,10 @@ def passage_matrix(passage: Passage) -> Array:
     return out
 
 
+@cache
 def _jump(params: FlowParams) -> Array:
     """What a step of the flow does to the whole state, (n, 2)."""
-    return np.concatenate([flow.jump(params), np.zeros((3, 2))])
+    return readonly(np.concatenate([flow.jump(params), np.zeros((3, 2))]))
 
 
 def _predicted(state: JointState, seen: Observation, passage: Passage, params: JointParams) -> JointState:
