@@ -300,6 +300,26 @@ class TestCurrent:
         _, dives = told([first, with_samples(second, **stale, current_final_x=None, current_final_y=None)])
         assert dives[1].current is None
 
+    def test_a_surfacing_without_a_fix_closes_nothing_and_takes_no_current(self):
+        """Three dives; the fixes after the second and before the third are in no file. What was published
+        between them is neither the first dive's, nor that of all the way to the next fix."""
+        made = mission([*LEGS[:1], Leg(hours=3), Leg(hours=3)])
+        t = opened([*LEGS[:1], Leg(hours=3)], 2)  # when the third segment opens
+        ends = t - 1200.0, t + 3600.0
+        second, third = (
+            {k: (v.between(*span) if k in {"fix_lat", "fix_lon"} else v) for k, v in each.quantities.items()}
+            for each, span in ((made[1], (0.0, ends[0])), (made[2], (ends[1], np.inf)))
+        )
+        _, dives = told([made[0]])
+        kept = current_of(dives[0])
+        _, dives = told([made[0], replace(made[1], quantities=second), replace(made[2], quantities=third)])
+        assert len(dives) == 2
+        first, long = dives
+        # corrected at the start of the second segment, and not by what came four hours later
+        assert current_of(first) == pytest.approx((0.1, -0.05)) and kept == pytest.approx((0.12, -0.07))
+        assert long.features.surfacing_unseen and long.current is None
+        assert any("surfaced without a fix" in note for note in long.notes)
+
     def test_a_value_from_before_the_first_dive_gives_none(self):
         s = mission(LEGS[:1])[0]
         early = {f"current_{c}": [(START + 60, 0.4)] for c in "xy"}

@@ -30,7 +30,7 @@ LEAST_SLIP, MOST_SLIP, MOST_SIDE = -0.1, 0.95, 0.85
 """What slip of the state can be: on board at most a tenth of W too much is allowed for the angle of attack,
 and a glider does not fly backwards. A compass, or a bent wing, that turns the way by more than a radian (its
 sine) is not thought of."""
-RARE = 1e-3
+RARE = 0.01
 """Weight of a mode below which it is left out of the mixture."""
 
 
