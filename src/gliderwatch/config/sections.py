@@ -128,7 +128,8 @@ class Rules(Section):
     false_alarm: FalseAlarm = Field(default=FalseAlarm(), description="Flag 2.")
     reminder_hours: Annotated[Number, Field(gt=0, le=8760)] | None = Field(
         default=_R.reminder_hours,
-        description="Hours until an open incident is brought to mind; again after 2, 4, 7, 14, ... times that; null: none.",
+        description="Hours until an open incident is brought to mind; again after 2, 4, 7, 14, ... times "
+        "that; null: none.",
     )
 
 
