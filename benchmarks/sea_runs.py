@@ -8,6 +8,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import msgspec
@@ -36,7 +37,7 @@ from gliderwatch.store.sqlite import File, Status, Store
 
 DAY, HOUR = 86400.0, 3600.0
 ONSET, AFTER = 6.0, 15.5
-"""Days: when a fault begins, and how long the mission goes on."""
+"""Days: when a fault begins, and how long the mission is followed from then on."""
 SETTLED = 3.0
 """Day from which speeds and forecasts are compared with the truth."""
 FAULTS = {"remora": 3.0, "wing_loss": 0.4, "dac_wrong": 0.3, "fouling": 3.0}
@@ -111,13 +112,13 @@ def scenario(job: Job) -> Scenario:
         return sea_mission(job.sea, job.seed, days=job.days)
     healthy, kind = sea_mission(job.sea, job.seed, days=job.days), FaultKind(job.fault)
     fault = Fault(kind, healthy.start + ONSET * DAY, FAULTS[job.fault], SIZES[kind].ramp)
-    return with_fault(healthy, fault, ONSET + AFTER)
+    return with_fault(healthy, fault)
 
 
 def flight(job: Job) -> Flight:
     """The mission of a job: as it was kept, else simulated, written as files, read again and kept."""
     wanted = scenario(job)
-    key = hashlib.sha256(f"{_sources()}\n{wanted!r}".encode()).hexdigest()[:16]
+    key = hashlib.sha256(f"{_sources()}\n{wanted!r}\n{AFTER}".encode()).hexdigest()[:16]
     path = job.kept / f"{job.name}-{key}.segments"
     try:
         return unpacked(path.read_bytes(), Flight)
@@ -131,6 +132,7 @@ def flight(job: Job) -> Flight:
     return made
 
 
+@cache
 def _sources() -> str:
     """A hash of all that makes the segments: the simulator, the decoder and the shape of a segment."""
     root, digest = Path(gliderwatch.__file__).parent, hashlib.sha256()
@@ -151,7 +153,10 @@ def _flown(wanted: Scenario) -> Flight:
             segments.append(decode(path, [folder / "cache"]))
             on_shore.append(arrival.time)
             path.unlink()
-    return Flight(tuple(segments), tuple(on_shore), mission.truth)
+            if wanted.faults and arrival.time > wanted.faults[0].onset + AFTER * DAY:
+                break
+    truth = tuple(dive for dive in mission.truth if dive.t_surface <= on_shore[-1])
+    return Flight(tuple(segments), tuple(on_shore), truth)
 
 
 def run(job: Job, *, direct: bool = False) -> Result:

@@ -40,10 +40,13 @@ _INCIDENTS = (Kind.ANOMALY, Kind.FALSE_ALARM)
 
 @dataclass(frozen=True)
 class Healthy:
-    """What is said of healthy gliders in one kind of sea. Messages are per glider-month, ``unknown`` of
-    them that nothing could be judged, ``all_kinds`` all; ``judged`` is the part of dives with a flag, ``rms``
-    (m/s) and ``inside`` (part in the 95 % interval) of speeds from day 3; ``miss`` (km) and ``covered`` of
-    the ``forecasts`` of dives of three hours, ``late_covered`` of their times; ``cost`` (ms) a dive."""
+    """What is said of healthy gliders in one kind of sea.
+
+    Messages are per glider-month: ``unknown`` those that nothing could be judged, ``all_kinds`` all.
+    ``judged`` is the part of dives with a flag; ``rms`` (m/s) and ``inside`` (part in the 95 % interval) are
+    of speeds from day 3; ``miss`` (km) and ``covered`` of the places, ``late_covered`` of the times in the
+    ``forecasts`` of dives of three hours. ``cost`` (ms) is of a dive.
+    """
 
     sea: str
     months: float
@@ -63,9 +66,13 @@ class Healthy:
 
 @dataclass(frozen=True)
 class Faulty:
-    """What is said of a fault in one kind of sea. ``told`` is the part told as what it is within 15 days, by
-    an incident that opens, ``otherwise`` that told as something else at any time; ``delay`` (h, median,
-    infinite where most are not told); messages in two days and in fifteen: mean and most."""
+    """What is said of a fault in one kind of sea.
+
+    ``told`` is the part told as what it is within 15 days, by an incident that opens, ``otherwise`` the part
+    told as something else (as well); ``delay`` (h) is the median, infinite where most are not told. An
+    incident that was open before by mistake, and hides the fault, does not count. Of the messages in two days
+    and in fifteen the mean and the most.
+    """
 
     sea: str
     fault: str
@@ -175,19 +182,19 @@ def tables(results: Sequence[Result]) -> tuple[list[Healthy], list[Faulty]]:
 def shown(well: Sequence[Healthy], ill: Sequence[Faulty]) -> Iterator[str]:
     """The tables as lines."""
     yield "healthy, messages a glider-month; speed and forecasts (dives of 3 h) from day 3"
-    yield f"{'sea':12s} months anomal flag2 unknwn    all judged  rms cm/s in95   n3h miss km  cover time ms"
+    yield f"{'sea':13s} months anomal flag2 unknwn    all judged  rms cm/s in95   n3h miss km  cover time ms"
     for h in well:
         yield (
-            f"{h.sea:12s} {h.months:6.1f} {h.anomalies:6.2f} {h.false_alarms:5.2f} {h.unknown:6.2f} "
+            f"{h.sea:13s} {h.months:6.1f} {h.anomalies:6.2f} {h.false_alarms:5.2f} {h.unknown:6.2f} "
             f"{h.all_kinds:6.2f} {_part(h.judged)} {100 * h.rms:9.2f} {_part(h.inside)} {h.forecasts:5d} "
             f"{h.miss:7.2f}  {_part(h.covered)} {_part(h.late_covered)} {h.cost:7.1f}"
         )
     yield ""
     yield "fault on day 6: told as what it is within 15 days, median delay; told as something else; messages"
-    yield f"{'sea':12s} {'fault':10s}  n  told  delay h other  48 h mean most  15 d mean most"
+    yield f"{'sea':13s} {'fault':10s}  n  told  delay h other  48 h mean most  15 d mean most"
     for f in ill:
         yield (
-            f"{f.sea:12s} {f.fault:10s} {f.gliders:2d} {_part(f.told)} {f.delay:8.1f} {_part(f.otherwise)} "
+            f"{f.sea:13s} {f.fault:10s} {f.gliders:2d} {_part(f.told)} {f.delay:8.1f} {_part(f.otherwise)} "
             f"{f.two_days:9.1f} {f.two_days_most:4d} {f.fifteen_days:10.1f} {f.fifteen_days_most:4d}"
         )
 

@@ -68,8 +68,8 @@ class Segment:
     ``quantities`` maps names of `docs/nomenclature.md` (``fix_lat``, ``heading``, ``depth``, ...)
     to samples; a quantity the file does not hold is absent. ``completeness`` orders copies of
     one segment: the greater replaces the smaller. ``dropped`` counts values out of physical
-    range per quantity. ``declination`` is the angle from true to magnetic north (rad, east
-    positive), None where neither the file nor a position in it tells.
+    range per quantity, ``notes`` say what was corrected. ``declination`` is the angle from true to
+    magnetic north (rad, east positive), None where neither the file nor a position in it tells.
     """
 
     id: SegmentId
@@ -81,6 +81,7 @@ class Segment:
     declination: float | None = None
     declination_source: str = ""
     dropped: Mapping[str, int] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def get(self, name: str) -> Series:
         """The samples of a quantity, empty where the file has none."""

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from announcing import HOUR, STEP, Talk, World, dive
 from gliderwatch.model import Kind
-from gliderwatch.rules.announce import FLOW_CHANGE, NEWS, SPEED_CHANGE
+from gliderwatch.rules.constants import FLOW_CHANGE, NEWS, SPEED_CHANGE
 
 LETTERS = "0011122S-"
 append = st.tuples(st.just("append"), st.sampled_from(LETTERS), st.just(0.0))

@@ -6,7 +6,8 @@ import pytest
 
 from announcing import HOUR, STEP, Talk, World, dive
 from gliderwatch.model import Expected, Severity, Unusable
-from gliderwatch.rules.announce import NEWS, Said
+from gliderwatch.rules.announce import Said
+from gliderwatch.rules.constants import NEWS
 
 
 def test_nothing_known_nothing_said():

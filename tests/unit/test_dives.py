@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from gliderwatch.model import Dive, Segment, Series, Unusable
-from gliderwatch.navigation.dives import LONGEST, Navigation, extend
+from gliderwatch.navigation.constants import LONGEST_DIVE
+from gliderwatch.navigation.dives import Navigation, extend
 from gliderwatch.navigation.samples import concatenated
 from gliderwatch.navigation.track import closure
 from missions import LAT, LON, START, Leg, cut, mission, opened, segment, series
@@ -150,7 +151,7 @@ class TestUnusable:
         assert dive.unusable is Unusable.WILD_FIX
 
     def test_days_without_a_fix_are_no_dive(self):
-        legs = [Leg(hours=LONGEST / 3600 + 1)]
+        legs = [Leg(hours=LONGEST_DIVE / 3600 + 1)]
         _, dives = told(mission(legs))
         assert dives == []
 

@@ -48,7 +48,9 @@ def config(tmp_path: Path) -> Config:
     over = incident(id="electa/anomaly/1", opened_at=1.0, cleared_at=2.0)
     for i in (over, incident()):
         put_incident(store, i)
-    store._db.execute("INSERT INTO segments VALUES ('electa', 0, 'electa-1', '[0, 0, \"\"]', x'00', NULL, 0)")
+    store._db.execute(
+        "INSERT INTO segments VALUES ('electa', 0, 'electa-1', '[0, 0, \"\"]', 0, 0, 0, 0, x'00', NULL)"
+    )
     store.close()
     return load(path)
 

@@ -10,21 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gliderwatch.model import EMPTY, Array, Segment, Series, readonly
+from gliderwatch.navigation.constants import (
+    FASTEST_RECKONED,
+    FULL_POWER,
+    LONGEST_STEP,
+    SHORTEST_STEP,
+    SLOWEST_RECKONED,
+    SPACING,
+)
 from gliderwatch.navigation.frame import heading_vectors, magnetic_to_true, to_plane
 
 Samples = Mapping[str, Series]
 
-SPACING = 30.0
-"""Seconds: finer samples are averaged to this. A glider turns and pitches in minutes, and a
-checkpoint that carries a dive on to the next segment stays small also for 4 s data."""
 
-FULL_POWER = 24.0
-"""W of a thruster that is fully on: power goes with the square of the setting (electa-2022: 2.9 W at 35 %,
-8.6 W at 60 %)."""
-SHORTEST_STEP, LONGEST_STEP = 10.0, 3600.0
-"""Seconds between two dead-reckoned positions that tell a direction."""
-SLOWEST, FASTEST = 0.03, 1.5
-"""m/s between dead-reckoned positions on a flight; faster ones jump to a fix."""
 _VOLUMES = ("ballast", "oil_volume")
 _KEPT = ("pitch", "roll", "depth", "speed_onboard", "dr_state", "dr_time", "thruster_on", "vacuum", *_VOLUMES)
 _PAIRS = (("fix_lat", "fix_lon"), ("dr_lat", "dr_lon"))
@@ -118,7 +116,9 @@ def _reckoned(samples: Mapping[str, Series]) -> tuple[Array, NDArray[np.float64]
     dt = np.diff(lat.t)
     step = np.diff(to_plane(lat.v, lon.v, float(lat.v[0]), float(lon.v[0])), axis=0)
     speed = np.hypot(*step.T) / np.maximum(dt, 1e-3)
-    good = (dt >= SHORTEST_STEP) & (dt <= LONGEST_STEP) & (speed > SLOWEST) & (speed < FASTEST)
+    good = (
+        (dt >= SHORTEST_STEP) & (dt <= LONGEST_STEP) & (speed > SLOWEST_RECKONED) & (speed < FASTEST_RECKONED)
+    )
     return (lat.t[1:] - dt / 2)[good], step[good] / (speed * dt)[good, None]
 
 

@@ -7,15 +7,19 @@ from typing import NamedTuple
 import numpy as np
 
 from gliderwatch.model import Array, Current, Fix, Series, Track, readonly
-from gliderwatch.navigation.fixes import FASTEST
-from gliderwatch.navigation.flight import SPARSE, Flight
+from gliderwatch.navigation.constants import (
+    CIRCLING,
+    FASTEST_OVER_GROUND,
+    JUMP,
+    NOMINAL_SPEED,
+    RECKONED_GAP,
+    RECKONED_PART,
+    RECKONED_POSITIONS,
+    SPARSE,
+)
+from gliderwatch.navigation.flight import Flight
 from gliderwatch.navigation.frame import to_plane
 from gliderwatch.navigation.samples import Samples, get
-
-NOMINAL_SPEED = 0.3
-"""m/s: shapes a track where the glider reports no speed; the fixes correct its length."""
-CIRCLING = 0.1
-"""Length of the mean heading vector below which a mean direction means nothing."""
 
 
 def build_track(samples: Samples, flight: Flight, start: Fix, end: Fix) -> Track:
@@ -74,13 +78,13 @@ def _reckoning(samples: Samples, flight: Flight) -> tuple[Series, Series] | None
     """The glider's own positions on a flight; None if too sparse, or if they jump to a fix."""
     lat = get(samples, "dr_lat").between(flight.start, flight.end)
     lon = get(samples, "dr_lon").between(flight.start, flight.end)
-    if len(lat) < 4:
+    if len(lat) < RECKONED_POSITIONS:
         return None
     gaps, covered = np.diff(lat.t), float(lat.t[-1] - lat.t[0])
-    if covered < 0.8 * flight.duration or gaps.max() > max(SPARSE, 0.2 * flight.duration):
+    if covered < RECKONED_PART * flight.duration or gaps.max() > max(SPARSE, RECKONED_GAP * flight.duration):
         return None
     xy = to_plane(lat.v, lon.v, float(lat.v[0]), float(lon.v[0]))
-    if (np.hypot(*np.diff(xy, axis=0).T) > FASTEST * gaps + 100.0).any():
+    if (np.hypot(*np.diff(xy, axis=0).T) > FASTEST_OVER_GROUND * gaps + JUMP).any():
         return None
     return lat, lon
 

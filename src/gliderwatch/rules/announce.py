@@ -16,18 +16,10 @@ from typing import Protocol
 from gliderwatch.alerts import message
 from gliderwatch.model import Alert, Assessment, Expected, Incident
 from gliderwatch.rules.acknowledged import Acks
+from gliderwatch.rules.constants import FLOW_CHANGE, MARKS, NEWS, SLACK, SPEED_CHANGE, WEEK
 from gliderwatch.rules.overdue import Silence
 from gliderwatch.rules.unknown import Unknown
 
-NEWS = 86400.0
-"""Seconds: an incident that was over for longer when it became known is history, not news."""
-MARKS, WEEK, SLACK = (1.0, 2.0, 4.0, 7.0), 7.0, 0.2
-"""Days after which an open incident is brought to mind, and then each week; how much of a day sooner after
-the message before one may come, because surfacings do not fall on full days."""
-SPEED_CHANGE = 0.05
-"""m/s: a smaller change of a speed that was told is not worth a correction."""
-FLOW_CHANGE = 0.05
-"""m/s: the same for the reference flow."""
 NO_ACKS: Acks = MappingProxyType({})
 
 
@@ -49,13 +41,15 @@ class Said:
     """What people have been told of one glider.
 
     ``surfaced`` is the surfacing of the last notice (s), ``silences`` what was told of its staying away
-    (`rules.overdue`), ``unknown`` of dives that could not be judged (`rules.unknown`).
+    (`rules.overdue`), ``unknown`` of dives that could not be judged (`rules.unknown`), ``irregularities``
+    the ids of those of its files.
     """
 
     threads: tuple[Thread, ...] = ()
     surfaced: float | None = None
     silences: tuple[Silence, ...] = ()
     unknown: Unknown | None = None
+    irregularities: tuple[str, ...] = ()
 
 
 class Known(Protocol):

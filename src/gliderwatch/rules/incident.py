@@ -12,11 +12,7 @@ from enum import StrEnum
 
 from gliderwatch.model import Assessment, Flag, Incident, Kind
 from gliderwatch.params import AnomalyRule, FalseAlarmRule, RuleParams
-
-WELL = 0.3
-"""Part of the way from the lower bound to the usual speed from which an open anomaly is over."""
-SURELY = 2.0
-"""Standard errors by which a speed must be below normal for one dive alone to be severe."""
+from gliderwatch.rules.constants import SEVERE, SURELY, WELL
 
 
 class Phase(StrEnum):
@@ -116,7 +112,7 @@ def is_severe(dive: Assessment) -> bool:
     if dive.speed is None:
         return False
     sigma = dive.evidence.get("speed_sigma", 0.0)
-    return dive.speed < dive.speed_min / 2 and dive.speed + SURELY * sigma < dive.speed_min
+    return dive.speed < SEVERE * dive.speed_min and dive.speed + SURELY * sigma < dive.speed_min
 
 
 def departure(dive: Assessment, kind: Kind) -> float:

@@ -102,7 +102,12 @@ def _written(array: Array) -> dict[str, Any]:
     return {"shape": list(array.shape), "f64": base64.b64encode(data.tobytes()).decode()}
 
 
-CONVERTERS: Mapping[type, tuple[Converter, ...]] = {GliderState: (typed_dives, one_sea), Segment: ()}
+def same(segment: Any) -> Any:
+    """Layout 1 to 2 of a segment: its notes are empty."""
+    return segment
+
+
+CONVERTERS: Mapping[type, tuple[Converter, ...]] = {GliderState: (typed_dives, one_sea), Segment: (same,)}
 """For each kind of record the way from layout 1 to today's: the n-th leads from layout n to n + 1. What is in
 it stays in it, for records of every layout are in use somewhere."""
 
