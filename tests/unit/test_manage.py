@@ -62,7 +62,7 @@ def put_incident(store: Store, i: object) -> None:
 class TestAcknowledged:
     def test_reminders_stop_and_the_all_clear_comes(self) -> None:
         said = {taken_on: self._kinds("0" + "1" * 30, "0" + "1" * 30 + "00", taken_on) for taken_on in (0, 1)}
-        assert said[0] == ["anomaly", "reminder", "reminder", "reminder", "all_clear"]
+        assert said[0] == ["anomaly", "reminder", "reminder", "all_clear"]  # after 1 and 2 days
         assert said[1] == ["anomaly", "all_clear"]
 
     def test_they_come_again_when_it_grows_worse(self) -> None:

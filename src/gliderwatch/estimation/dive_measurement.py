@@ -11,7 +11,6 @@ import numpy as np
 from gliderwatch.estimation.kinematic_speed import KinematicSpeed
 from gliderwatch.model import Array, Dive, Fix, readonly
 from gliderwatch.navigation.geodesy import displacement
-from gliderwatch.sea.gauss_markov import FlowParams, mean_flow
 
 # ----------------------------------------
 # What one dive measures of speed and flow, and how well. Pure.
@@ -32,6 +31,14 @@ COMPASS = 0.02
 COMMANDED = 0.08
 """rad: how far the mean of the commanded headings of a dive is from that of measured ones, where only they
 are sent: 0.04 to 0.09 on the four missions that have both (robust standard deviations)."""
+LIKELY, ASSUMED = 0.92, 0.2
+"""Usual length of the mean heading vector of a dive whose headings are not known, and its standard error."""
+STRAIGHT, TURNING = 0.9, 0.5
+"""Length of the mean of the few headings there are, below which it turned, and the standard error then."""
+STEERED = 0.1
+"""The same error where the commanded headings tell the length."""
+SHAPE = 0.03
+"""The same error where the dead-reckoned way tells the length."""
 UNEVEN = 0.05
 """Part of the speed by which dives and climbs differ: matters where the heading differs between them too."""
 UNSEEN = 0.5
@@ -57,7 +64,8 @@ class Observation:
     ``ground_cov`` ((2, 2)) but for what is wrong with the heading; ``heading`` h ((2,)) with covariance
     ``heading_cov`` ((2, 2)); ``current`` c (m/s, (2,), None: not reported) with standard error
     ``current_sigma`` a component; ``slip`` the part of W that an angle of attack takes, by physics;
-    ``unseen`` the part of the flight within gaps between headings.
+    ``unseen`` the part of the flight within gaps between headings. ``is_free``: no heading was measured, so
+    that its direction is that of g - c and nothing is told by what is across.
     """
 
     start: float
@@ -70,6 +78,7 @@ class Observation:
     current_sigma: float
     slip: float
     unseen: float
+    is_free: bool = False
 
     @property
     def steadiness(self) -> float:
@@ -93,7 +102,7 @@ class Observation:
     def across(self, speed: float) -> tuple[float, float] | None:
         """What of g - c is across the heading, left positive, and its standard error (m/s) at that W."""
         rest, length = self.rest, self.steadiness
-        if rest is None or length < 1e-3:
+        if rest is None or length < 1e-3 or self.is_free:
             return None
         aside = np.array([-self.heading[1], self.heading[0]]) / length
         return float(rest @ aside), math.sqrt(float(aside @ self.rest_cov(speed) @ aside))
@@ -114,14 +123,25 @@ def observe(dive: Dive) -> Observation:
     share = dt[flying] / interval
     flown, vectors = float(share.sum()), track.heading[flying]
     current = dive.current
+    ground = track.x[-1] / interval
+    velocities = (np.diff(track.x, axis=0) / np.maximum(dt, 1e-3)[:, None])[flying]
+    vectors, spread = _directed(vectors, velocities, share, dive)
     error = REPORTED if current is None or current.final else PROVISIONAL
     return Observation(
         start=float(track.t[0]),
         end=float(track.t[-1]),
-        ground=readonly(track.x[-1] / interval),
+        ground=readonly(ground),
         ground_cov=readonly((2 * (GPS / interval) ** 2 + ((1 - flown) * SURFACE_FLOW) ** 2) * np.eye(2)),
         heading=readonly(share @ vectors),
-        heading_cov=readonly(_heading_cov(vectors, share, dive, interval)),
+        heading_cov=readonly(
+            (
+                _missing(dive, interval, flown)
+                if _is_free(dive)
+                else _heading_cov(vectors, share, dive, interval)
+            )
+            + spread
+        ),
+        is_free=_is_free(dive),
         current=None if current is None else readonly([current.u, current.v]),
         current_sigma=math.hypot(error, 2 * GPS / interval),
         slip=_slip(dive),
@@ -140,6 +160,52 @@ def are_apart(end: Fix, start: Fix) -> bool:
     return gap > NEW_AFTER or moved > CARRIED * max(gap, 600.0)
 
 
+def _is_free(dive: Dive) -> bool:
+    """Whether the direction of a dive's heading is that which its current leaves."""
+    return dive.current is not None and is_unmeasured(dive)
+
+
+def is_unmeasured(dive: Dive) -> bool:
+    """Whether the headings of a dive are not those of its compass."""
+    known = dive.features
+    return known.heading_reckoned or known.heading_commanded > 0 or known.heading_assumed
+
+
+def _directed(vectors: Array, velocities: Array, share: Array, dive: Dive) -> tuple[Array, Array]:
+    """The heading vectors where none were measured, and what that adds to the covariance of their mean.
+
+    The glider reckons with its compass, so that g - c = W h holds with the heading that nobody sent. Its
+    dead-reckoned way, drawn to the fixes, has the ``velocities`` (m/s, (k, 2)) over ground: less the current
+    these are W times the headings, whatever current the glider had put into its way. With nothing at all the
+    course is taken for that of a leg.
+    """
+    none = np.zeros((2, 2))
+    reckoned, commanded = dive.features.heading_reckoned, dive.features.heading_commanded > 0
+    if not len(vectors) or not is_unmeasured(dive):
+        return vectors, none
+    flown = float(share.sum())
+    if dive.current is None:
+        # the way has the current in it, the course need not be flown as commanded
+        error = COMMANDED if commanded else 0.3 if reckoned else 1.0
+        return vectors, np.asarray((error * flown) ** 2 * np.eye(2))
+    through = velocities - np.array([dive.current.u, dive.current.v])
+    mean = share @ through / flown
+    rest = float(np.hypot(*mean))
+    if rest < 1e-3:
+        return vectors, np.asarray(flown**2 * np.eye(2))
+    along = mean / rest
+    seen = float(np.hypot(*(share @ vectors))) / flown
+    if reckoned:
+        speeds = np.hypot(*through.T)
+        length, error = rest / max(float(share @ speeds) / flown, rest), SHAPE
+    elif commanded:
+        length, error = seen, STEERED if seen > STRAIGHT else TURNING
+    else:
+        length, error = LIKELY * seen, ASSUMED if seen > STRAIGHT else TURNING
+    error *= flown
+    return np.tile(length * along, (len(vectors), 1)), np.asarray(error**2 * np.outer(along, along))
+
+
 def _heading_cov(vectors: Array, share: Array, dive: Dive, interval: float) -> Array:
     """Covariance of the mean heading vector: few samples, compass, uneven speed, hours not seen.
 
@@ -153,12 +219,18 @@ def _heading_cov(vectors: Array, share: Array, dive: Dive, interval: float) -> A
     steps = np.diff(vectors, axis=0)
     swings = 2 * (steps.T @ steps + CONTROL**2 * np.eye(2)) / (len(steps) + 1)
     aside = np.array([-mean[1], mean[0]])
-    off = math.hypot(COMPASS, COMMANDED * dive.features.heading_commanded)
-    turned = (off * flown) ** 2 * np.outer(aside, aside)
+    turned = (COMPASS * flown) ** 2 * np.outer(aside, aside)
     uneven = (UNEVEN * flown) ** 2 * max(0.0, 1 - float(mean @ mean)) / 2
-    # by way of hours, which keeps the last bit of every estimate of the missions on record
+    return np.asarray(
+        swings * float(share @ share) + turned + uneven * np.eye(2) + _missing(dive, interval, 0.0)
+    )
+
+
+def _missing(dive: Dive, interval: float, flown: float) -> Array:
+    """Covariance of the mean heading vector by hours of which no data came, and by the compass on a part
+    ``flown``."""
     missing = UNSEEN * (dive.features.unobserved / 3600) * 3600 / interval
-    return np.asarray(swings * float(share @ share) + turned + (uneven + missing**2) * np.eye(2))
+    return np.asarray((missing**2 + (COMPASS * flown) ** 2) * np.eye(2))
 
 
 def _slip(dive: Dive) -> float:
@@ -186,87 +258,110 @@ def _unseen(dt: Array) -> float:
 
 
 # ----------------------------------------
-# The measurements of a dive as linear functions of the joint state. Pure.
+# What one dive measures, as an explicit function of the state. Pure.
 #
-# The state ends with the own speed W, slip and side; before them is the flow. See `joint` for the equations.
+# Of the state a dive shows five numbers: the mean flow F over it (east, north), the speed W that the glider
+# reckons with, and slip s and side d, by which its real way through the water differs from that. With h the
+# mean heading vector and h' that vector turned left it measures
+#
+#     g = F + W ((1 - s) h - d h')        ground velocity
+#     c = F - W (s h + d h')              depth-averaged current, so that g - c = W h
+#     w = W                               speed by depth rate and pitch, or by the glider's own mean
+#
+# each only where it is there. s is the slip of physics, that of drag, and the slip in the state.
 
 OWN, SLIP, SIDE = -3, -2, -1
 """Places in the state of W (m/s), and of slip and side (parts of W)."""
+SHOWN = 5
+"""How many numbers of the state a dive shows: those at its end."""
+SLOWEST, FASTEST = 0.02, 1.3
+"""m/s: between these is the speed of any glider through the water."""
+DRAG_SLIP = 0.9
+"""Slip that drag adds where it takes all of the speed, as part of W."""
 
 
 @dataclass(frozen=True, slots=True)
-class Linear:
-    """Measurements of one dive, linear in the n numbers of the state.
+class Slipping:
+    """What is known of slip beside the state: of ``physics`` (part of W), ``noise`` of it on one dive, and
+    the ``usual`` speed through the water (m/s, None: not known) below which drag adds to it."""
 
-    ``rows`` ((m, n)), ``innovation`` ((m,)) at the predicted state, ``noise`` ((m, m)); the ground
-    velocity comes first (2), then the current (2) if there is one.
-    """
-
-    rows: Array
-    innovation: Array
-    noise: Array
-
-    def first(self, m: int) -> Linear:
-        """The first ``m`` of the measurements."""
-        return Linear(self.rows[:m], self.innovation[:m], self.noise[:m, :m])
-
-    def with_own(self, x: Array, told: KinematicSpeed) -> Linear:
-        """These and W as ``told``, at the state ``x`` ((n,))."""
-        row = np.zeros((1, len(x)))
-        row[0, OWN] = 1.0
-        m = len(self.rows)
-        noise = np.zeros((m + 1, m + 1))
-        noise[:m, :m], noise[m, m] = self.noise, told.sigma**2
-        innovation = np.append(self.innovation, told.speed - x[OWN])
-        return Linear(np.concatenate([self.rows, row]), innovation, noise)
+    physics: float
+    noise: float
+    usual: float | None
 
 
 @dataclass(frozen=True, slots=True)
-class Guess:
-    """About what the measurements are linear: ``own`` speed W (m/s), the ``slip`` that is known of beside
-    that of the state (part of W), and the standard error ``slip_sigma`` of that on this dive."""
+class Measured:
+    """The measurements of a dive: ``values`` ((m,)): g (2), c (2, where there is ``current``), w (1, where
+    it ``tells``)."""
 
-    own: float
-    slip: float
-    slip_sigma: float
+    seen: Observation
+    tells: KinematicSpeed | None
+    doubt: float
+    slipping: Slipping
 
+    @property
+    def has_current(self) -> bool:
+        """Whether a current was reported."""
+        return self.seen.current is not None
 
-def measure(seen: Observation, x: Array, guess: Guess, doubt: float, flow: FlowParams) -> Linear:
-    """The measurements of a dive at the predicted state ``x`` ((n,)).
-
-    ``doubt`` is a factor on the variances of the measurements. The error of slip on this dive is one of
-    ground velocity and current alike.
-    """
-    h, own = seen.heading, guess.own
-    aside = np.array([-h[1], h[0]])
-    rows = np.zeros((4, flow.size + 3))
-    rows[:2, : flow.size] = rows[2:, : flow.size] = mean_flow(seen.start, seen.end, flow)
-    rows[2:, OWN] = -(guess.slip + x[SLIP]) * h - x[SIDE] * aside
-    rows[:2, OWN] = h + rows[2:, OWN]
-    rows[:2, SLIP] = rows[2:, SLIP] = -own * h
-    rows[:2, SIDE] = rows[2:, SIDE] = -own * aside
-    noise = np.zeros((4, 4))
-    noise[:2, :2] = seen.ground_cov + own**2 * seen.heading_cov
-    noise[2:, 2:] = seen.current_sigma**2 * np.eye(2)
-    along = np.tile(own * guess.slip_sigma * h, 2)
-    # the products of W with slip and side are in two columns each: take them out once
-    once = np.tile(own * (x[SLIP] * h + x[SIDE] * aside), 2)
-    measured = np.concatenate([seen.ground, seen.current if seen.current is not None else np.zeros(2)])
-    linear = Linear(rows, measured - rows @ x - once, doubt * noise + np.outer(along, along))
-    return linear if seen.current is not None else linear.first(2)
+    @property
+    def values(self) -> Array:
+        """The numbers measured, (m,)."""
+        parts = [self.seen.ground]
+        if self.seen.current is not None:
+            parts.append(self.seen.current)
+        if self.tells is not None:
+            parts.append(np.array([self.tells.speed]))
+        return np.concatenate(parts)
 
 
-def drag_slip(speed: float, usual: float | None) -> tuple[float, float]:
-    """The slip that drag adds on a glider slower than usual (m/s): mean and standard error, parts of W.
+def drag_slip(speed: Array, usual: float | None) -> Array:
+    """The slip that drag adds on a glider slower than usual (m/s), parts of W; half of it is its standard
+    error.
 
     More drag at the same pitch needs more lift, so a larger angle of attack. With the flight model of
     Merckelbach et al. (2019) slip rises by 1.5 (1 - speed / usual)^2 where drag alone slows a Slocum,
     and not at all where it lacks buoyancy. Which of the two it is, is not known here.
 
-    >>> drag_slip(0.25, 0.25), drag_slip(0.1, None)
-    ((0.0, 0.0), (0.0, 0.0))
+    >>> drag_slip(np.array([0.25]), 0.25).tolist(), drag_slip(np.array([0.1]), None).tolist()
+    ([0.0], [0.0])
     """
     if usual is None or usual <= 0:
-        return 0.0, 0.0
-    lost = min(max(1 - speed / usual, 0.0), 1.0)
-    return 0.9 * lost**2, 0.45 * lost**2
+        return np.zeros_like(speed)
+    return np.asarray(DRAG_SLIP * np.clip(1 - speed / usual, 0.0, 1.0) ** 2)
+
+
+def slip_of(x: Array, slipping: Slipping) -> tuple[Array, Array]:
+    """All of slip, and its standard error on one dive, at states ``x`` ((k, 5)): (k,) each."""
+    own = np.clip(x[:, OWN], SLOWEST, FASTEST)
+    drag = drag_slip(own * (1 - slipping.physics - x[:, SLIP]), slipping.usual)
+    return slipping.physics + drag + x[:, SLIP], np.hypot(drag / 2, slipping.noise)
+
+
+def expected(x: Array, measured: Measured) -> tuple[Array, Array, Array]:
+    """h(x), its slope and the noise at states ``x`` ((k, 5)): (k, m), (k, m, 5), (k, m, m)."""
+    seen, k = measured.seen, len(x)
+    h = seen.heading
+    aside = np.array([-h[1], h[0]])
+    own = np.clip(x[:, OWN], SLOWEST, FASTEST)
+    slip, slip_sigma = slip_of(x, measured.slipping)
+    lost = slip[:, None] * h + x[:, SIDE, None] * aside
+    wrong = own[:, None] * lost
+    flow = x[:, :2]
+    values, slope = [flow + own[:, None] * h - wrong], np.zeros((k, 5, SHOWN))
+    slope[:, [0, 2], 0] = slope[:, [1, 3], 1] = 1.0
+    slope[:, :2, OWN], slope[:, 2:4, OWN] = h - lost, -lost
+    slope[:, :2, SLIP] = slope[:, 2:4, SLIP] = -own[:, None] * h
+    slope[:, :2, SIDE] = slope[:, 2:4, SIDE] = -own[:, None] * aside
+    slope[:, 4, OWN] = 1.0
+    values += [flow - wrong, own[:, None]]
+    noise = np.zeros((k, 5, 5))
+    noise[:, :2, :2] = measured.doubt * (seen.ground_cov + own[:, None, None] ** 2 * seen.heading_cov)
+    noise[:, 2:4, 2:4] = measured.doubt * seen.current_sigma**2 * np.eye(2)
+    along = np.tile((own * slip_sigma)[:, None] * h, 2)
+    noise[:, :4, :4] += along[:, :, None] * along[:, None, :]
+    if measured.tells is not None:
+        noise[:, 4, 4] = measured.tells.sigma**2
+    there = [0, 1, *([2, 3] if measured.has_current else []), *([4] if measured.tells is not None else [])]
+    return np.concatenate(values, axis=1)[:, there], slope[:, there], noise[:, there][:, :, there]

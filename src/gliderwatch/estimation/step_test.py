@@ -10,7 +10,6 @@ import numpy as np
 
 from gliderwatch.estimation.dive_measurement import SIDE, SLIP
 from gliderwatch.model import Array, readonly
-from gliderwatch.sea.gauss_markov import LASTING
 
 # ----------------------------------------
 # Evidence over several dives. Pure.
@@ -97,11 +96,11 @@ def advance(bank: Bank, shape: Array, precision: Array, kept: Array, update: Upd
     """The bank after one more dive.
 
     ``shape`` ((n, q)) is what a step does to the state, ``precision`` ((q, q)) what is known of its size
-    before, ``kept`` ((n,)) the diagonal transition to the dive.
+    before, ``kept`` ((n, n)) the transition to the dive.
     """
     n, q = shape.shape
     old = 1 - WINDOW
-    shift = np.concatenate([bank.shift.reshape(-1, n, q)[old:] * kept[:, None], shape[None]])
+    shift = np.concatenate([kept @ bank.shift.reshape(-1, n, q)[old:], shape[None]])
     info = np.concatenate([bank.info.reshape(-1, q, q)[old:], precision[None]])
     score = np.concatenate([bank.score.reshape(-1, q)[old:], np.zeros((1, q))])
     seen = update.rows @ shift
@@ -194,22 +193,21 @@ MOST = 4.0
 
 
 def steps(
-    bank: Bank, kept: Array, update: Update, sea: float, front: float
+    bank: Bank, matrix: Array, update: Update, jump: Array, front: float
 ) -> tuple[Step | None, Step | None, Bank]:
     """The likeliest loss (a step up in slip) and turn (one in side), and the bank with one more dive.
 
-    ``kept`` ((n,)) is the transition to the dive and ``update`` that of the filter. The flow may have changed
-    together with the step: by ``front`` (m/s, a component) in a usual sea, more where ``sea`` is above 1.
-    No dive alone may prove a step.
+    ``matrix`` ((n, n)) is the transition to the dive and ``update`` that of the filter. The flow may have
+    changed together with the step, by ``front`` (m/s, a component), which does ``jump`` ((n, 2)) to the
+    state. No dive alone may prove a step.
     """
-    n = len(kept)
-    shape = np.zeros((n, 4))
-    shape[[n + SLIP, n + SIDE], [0, 1]] = 1.0
-    shape[[LASTING.start, LASTING.start + 1], [2, 3]] = 1.0
+    shape = np.zeros((len(matrix), 4))
+    shape[[SLIP, SIDE], [0, 1]] = 1.0
+    shape[:, 2:] = jump
     sizes = np.array([LARGEST, LARGEST, front, front])
     square = float(update.innovation @ update.weight @ update.innovation)
     believed = update.innovation * min(1.0, MOST / math.sqrt(max(square, 1e-12)))
-    bank = advance(bank, shape, np.diag(sizes**-2), kept, replace(update, innovation=believed))
+    bank = advance(bank, shape, np.diag(sizes**-2), matrix, replace(update, innovation=believed))
     return likeliest(bank, 0, sign=1), likeliest(bank, 1), bank
 
 

@@ -72,3 +72,17 @@ REMINDER_GROWTH = 2.0
 """Reminders come after 1, 2 and 4 times `reminder_hours`,"""
 THINNED = 7.0
 """then each time after so many of them: once a week where they are daily."""
+
+# When an incident opens, and is over
+WELL = 0.3
+"""Part of the way from the lower bound to the usual speed from which an open anomaly is over."""
+SURELY = 2.0
+"""Standard errors by which a speed must be below normal for one dive alone to be severe."""
+
+# Reminders of what is open
+MARKS = (1.0, 2.0, 4.0, 7.0)
+"""Days after which an open incident is brought to mind,"""
+WEEK = 7.0
+"""and then each time after so many days."""
+SLACK = 0.2
+"""Of a day: so much sooner a reminder may come; surfacings do not fall on full days."""

@@ -104,3 +104,13 @@ LEAST_RATE = 0.02
 """m/s: a slower change of depth is a glider that levels or turns; usual are 0.1 to 0.2."""
 FEW_RATES = 2
 """Rates of one direction that tell a median."""
+
+# Heading from the dead-reckoned track
+SHORTEST_STEP = 10.0
+"""s between two dead-reckoned positions that tell a direction, at least: their digits are coarse."""
+LONGEST_STEP = 3600.0
+"""s, at most: a glider turns within the hour."""
+SLOWEST_RECKONED = 0.03
+"""m/s between dead-reckoned positions on a flight: slower is no flight."""
+FASTEST_RECKONED = 1.5
+"""m/s: faster ones jump to a fix."""

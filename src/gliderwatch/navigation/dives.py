@@ -10,6 +10,7 @@ import numpy as np
 from gliderwatch.model import Dive, DiveFeatures, Fix, Segment, Series, Unusable, readonly
 from gliderwatch.navigation.clock import forward_step, span
 from gliderwatch.navigation.constants import (
+    CURRENT_EARLY,
     FASTEST_OVER_GROUND,
     HEADING_GAP,
     HIDING_HOLE,
@@ -62,7 +63,14 @@ def why_unusable(
 
 
 def _blind(samples: Samples, flight: Flight) -> tuple[Unusable | None, str]:
-    """Why the headings of a flight do not do, and the same in words; None and empty when they do."""
+    """Why the headings of a flight do not do, and the same in words; None and empty when they do, or when
+    depth or pitch tell how fast it was."""
+    return (None, "") if flight.evidence.startswith(("depth", "pitch")) else unsteered(samples, flight)
+
+
+def unsteered(samples: Samples, flight: Flight) -> tuple[Unusable | None, str]:
+    """Why the course of a flight is not known from its headings, and the same in words; None and empty when
+    it is."""
     gap = heading_gap(samples, flight)
     if gap > MOST_BLIND * flight.duration:
         return Unusable.NO_HEADING, f"no heading for {gap / 3600:.1f} h"
@@ -91,8 +99,6 @@ def segment_notes(segment: Segment, declination: float | None, from_model: bool)
         notes.append("magnetic declination unknown: headings and currents are relative to magnetic north")
     elif from_model and segment.declination is not None:
         notes.append(f"magnetic declination from the model {segment.declination_source}")
-    if not len(segment.get("heading")) and len(segment.get("heading_commanded")):
-        notes.append("commanded heading used, the measured one is not in the file")
     return tuple(notes)
 
 
@@ -114,6 +120,12 @@ def flight_notes(flight: Flight, features: DiveFeatures) -> tuple[str, ...]:
         notes.append("no depth or pitch in the file: drift at the surface cannot be told from flight")
     if features.heading_steadiness is not None and features.heading_steadiness < TURNED_MUCH:
         notes.append("the glider turned much: its speed is hardly observable")
+    if features.heading_reckoned:
+        notes.append("no measured heading in the file: direction of the dead-reckoned way used")
+    if features.heading_commanded:
+        notes.append("commanded heading used, the measured one is not in the file")
+    if features.heading_assumed:
+        notes.append("headings missing: a steady course is assumed, in the direction that the current leaves")
     if features.heading_gap is not None:
         notes.append(f"no heading for {features.heading_gap / 3600:.1f} h of the dive: taken as steady")
     if features.unobserved:
@@ -136,10 +148,13 @@ class Navigation:
     ``fix`` is the last good one and ``carry`` the samples after it; ``declination`` (rad) the last known,
     ``declination_t`` when the glider told it (s; None: a model's); ``last_t`` the end of the
     latest segment (s); ``holes`` the times (start, end) since the fix of which no segment has come;
-    ``holder`` the segment that holds the flight since the fix; ``known`` the currents reported last and
-    ``reports`` those whose dive is not told yet; ``dive`` the last whole dive, ``untold`` the
-    surfacing (s) of a later one that is not told; ``notes`` on the data since the fix; ``latest`` the name of
-    the latest segment; ``surface_depth`` what the depth sensor shows at the surface (m; 0: near enough).
+    ``calls`` those between two segments that follow each other, in which none is missing, and ``last_name``
+    the name of the latest segment if it holds a whole flight and ends at the surface (else empty: it may
+    break off); ``holder`` the segment that holds the flight since the fix; ``known`` the currents reported
+    last and ``reports`` those whose dive is not told yet; ``dive`` the last whole dive, ``untold`` the
+    surfacing (s) of a later one that is not told; ``notes`` on the data since the fix;
+    ``latest`` the name of the latest segment; ``surface_depth`` what the depth sensor shows at the surface
+    (m; 0: near enough).
     """
 
     fix: Fix | None = None
@@ -148,6 +163,8 @@ class Navigation:
     declination_t: float | None = None
     last_t: float | None = None
     holes: tuple[tuple[float, float], ...] = ()
+    calls: tuple[tuple[float, float], ...] = ()
+    last_name: str = ""
     holder: str = ""
     known: Known = (None, None)
     reports: tuple[Report, ...] = ()
@@ -186,7 +203,8 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
         elif flight is not None and flight.duration >= SHORTEST_DIP:
             untold.append(flight.end)
         holes = tuple((max(a, last.t), b) for a, b in state.holes if b > last.t)
-        state = replace(state, fix=last, holder=segment.id.name, holes=holes, notes=quality)
+        calls = tuple((a, b) for a, b in state.calls if b > last.t)
+        state = replace(state, fix=last, holder=segment.id.name, holes=holes, calls=calls, notes=quality)
 
     oldest = (state.last_t or 0.0) - LONGEST_DIVE
     carry = after(samples, max(state.fix.t, oldest) if state.fix is not None else oldest)
@@ -195,7 +213,8 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
     waiting = [report for report in waiting if report.t > oldest]
     latest, later = (told[-1] if told else None), max(untold, default=None)
     later = later if later is not None and (latest is None or later > latest.t_surface) else None
-    state = replace(state, carry=carry, reports=tuple(waiting), dive=latest, untold=later)
+    name = state.last_name if under_way is None else ""
+    state = replace(state, carry=carry, reports=tuple(waiting), dive=latest, untold=later, last_name=name)
     news = [d for d in told if d is not before]
     if under_way is not None and under_way.duration >= SHORTEST_DIVE:
         news.append(_dive(state, segment.id.glider, carry, under_way, None))
@@ -219,18 +238,38 @@ def _with_declination(state: Navigation, segment: Segment) -> Navigation:
 
 def _placed(state: Navigation, segment: Segment, fresh: Samples, quality: tuple[str, ...]) -> Navigation:
     """The state with the place of a segment in time: a hole before it, and whether it holds the flight."""
-    holes = state.holes
+    holes, calls = state.holes, state.calls
     if state.last_t is not None and segment.id.opened_at - state.last_t > SHORTEST_HOLE:
-        holes = (*holes, (state.last_t, segment.id.opened_at))
+        gap = (state.last_t, segment.id.opened_at)
+        if follows(state.last_name, segment.id.name):
+            calls = (*calls, gap)
+        else:
+            holes = (*holes, gap)
     flies = find_flight(fresh, segment.id.opened_at - SPARSE, segment.last_t) is not None
     return replace(
         state,
         holes=holes,
+        calls=calls,
+        last_name=segment.id.name if flies else "",
         notes=tuple(dict.fromkeys(state.notes + quality)),
         last_t=max(segment.last_t, state.last_t or segment.last_t),
         holder=segment.id.name if flies or not state.holder else state.holder,
         latest=segment.id.name,
     )
+
+
+def follows(before: str, name: str) -> bool:
+    """Whether a segment is the next one of the same mission after another, so that none is missing between
+    them.
+
+    >>> follows("unit-2024-120-3-7", "unit-2024-120-3-8"), follows("unit-2024-120-3-7", "unit-2024-120-3-9")
+    (True, False)
+    """
+    mission, _, number = name.rpartition("-")
+    mission_before, _, number_before = before.rpartition("-")
+    if not (number.isdecimal() and number_before.isdecimal() and mission == mission_before):
+        return False
+    return int(number) == int(number_before) + 1
 
 
 def _with_clock(state: Navigation, segment: Segment, fresh: Samples) -> tuple[Navigation, float]:
@@ -246,8 +285,11 @@ def _with_clock(state: Navigation, segment: Segment, fresh: Samples) -> tuple[Na
         return state, 0.0
     carry = {name: Series(readonly(s.t + step), s.v) for name, s in state.carry.items()}
     holes = tuple((a + step, b + step) for a, b in state.holes)
+    calls = tuple((a + step, b + step) for a, b in state.calls)
     fix, last_t = replace(state.fix, t=state.fix.t + step), state.last_t + step
-    return replace(state, fix=fix, last_t=last_t, carry=MappingProxyType(carry), holes=holes), step
+    return replace(
+        state, fix=fix, last_t=last_t, carry=MappingProxyType(carry), holes=holes, calls=calls
+    ), step
 
 
 def _withdraw_old_fix(state: Navigation, fixes: list[Fix]) -> tuple[Navigation, list[Dive]]:
@@ -285,7 +327,8 @@ def _flight_since(state: Navigation, samples: Samples, end: Fix | None) -> Fligh
     ):
         hidden = [(a, min(b, last)) for a, b in state.holes if min(b, last) - a >= HIDING_HOLE]
         flight = Flight(*hidden[-1], evidence="missing") if hidden else None
-        if flight is None and end is not None and last - first >= HIDING_HOLE:
+        called = sum(min(b, last) - max(a, first) for a, b in state.calls if a < last and b > first)
+        if flight is None and end is not None and last - first - called >= HIDING_HOLE:
             flight = unseen(samples, first, last)
     return flight
 
@@ -303,8 +346,11 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
     else:
         track = build_track(samples, flight, start, end)
         gap = heading_gap(samples, flight)
+        known = track_features(samples, flight, track)
+        unsure = unsteered(samples, flight)[0] is not None and not known.heading_reckoned
         features = replace(
-            track_features(samples, flight, track),
+            known,
+            heading_assumed=known.heading_assumed or unsure,
             heading_gap=gap if gap > HEADING_GAP else None,
             unobserved=missing,
         )
@@ -330,16 +376,41 @@ def _with_currents(
 ) -> tuple[list[Dive], list[Report]]:
     """The dives with the currents published for them, and the reports of a dive that is not told yet.
 
-    `untold` are surfacings (s) of dives that are never told: their currents are nobody's.
+    `untold` are surfacings (s) of dives that are never told: their currents are nobody's. One that was
+    published well within a flight is that of a part of it, up to a surfacing without a fix: so is then the
+    one at its end, and neither is the current between the two fixes.
     """
+    flights = [(d.t_dive, d.t_surface, i) for i, d in enumerate(told)]
+    if under_way is not None:
+        flights.append((under_way.start, under_way.end, -1))
     ends: list[tuple[float, int | None]] = [(d.t_surface, i) for i, d in enumerate(told)]
     ends = sorted([*ends, *((t, None) for t in untold)], key=lambda end: end[0])
     surfaced = [t for t, _ in ends] + ([under_way.end] if under_way is not None else [])
     out, waiting = list(told), []
     for report, k in zip(reports, pair(reports, surfaced), strict=True):
+        part = next((i for a, b, i in flights if a + SPARSE < report.t < b - CURRENT_EARLY), None)
+        if part is not None:
+            if part < 0:
+                waiting.append(report)
+            else:
+                out[part] = _in_parts(out[part])
+            continue
         i = ends[k][1] if 0 <= k < len(ends) else None
         if k == len(ends):
             waiting.append(report)
-        elif i is not None and out[i].unusable is not Unusable.STALE_FIX:
+        elif (
+            i is not None
+            and out[i].unusable is not Unusable.STALE_FIX
+            and not out[i].features.surfacing_unseen
+        ):
             out[i] = replace(out[i], current=updated(out[i].current, report, out[i].t_surface))
     return out, waiting
+
+
+def _in_parts(dive: Dive) -> Dive:
+    """A dive in which the glider surfaced without a fix."""
+    if dive.features.surfacing_unseen:
+        return dive
+    note = "it surfaced without a fix on the way: the currents reported are those of parts of the dive"
+    features = replace(dive.features, surfacing_unseen=True)
+    return replace(dive, current=None, features=features, notes=(*dive.notes, note))

@@ -23,7 +23,7 @@ from gliderwatch.navigation.constants import (
 )
 from gliderwatch.navigation.flight import Flight
 from gliderwatch.navigation.samples import Samples, get
-from gliderwatch.navigation.track import Closure, mean_heading
+from gliderwatch.navigation.track import Closure, has_reckoning, mean_heading
 
 
 def evidence(features: DiveFeatures, closed: Closure | None = None) -> dict[str, float]:
@@ -41,6 +41,9 @@ def evidence(features: DiveFeatures, closed: Closure | None = None) -> dict[str,
         "heading_steadiness": f.heading_steadiness,
         "heading_mean": None if mean is None else degrees(mean) % 360,
         "heading_commanded": f.heading_commanded or None,
+        "heading_reckoned": float(f.heading_reckoned) or None,
+        "heading_assumed": float(f.heading_assumed) or None,
+        "surfacing_unseen": float(f.surfacing_unseen) or None,
         "depth_max": f.depth_max,
         "pitch_dive": f.pitch_dive,
         "pitch_climb": f.pitch_climb,
@@ -69,6 +72,9 @@ def track_features(samples: Samples, flight: Flight, track: Track) -> DiveFeatur
     mean, flown = mean_heading(track)
     commanded = get(samples, "commanded").between(flight.start, flight.end)
     headings = get(samples, "heading_e").between(flight.start, flight.end)
+    reckoned = get(samples, "reckoned").between(flight.start, flight.end)
+    unmeasured = len(commanded) > 0 or len(reckoned) > 0 or not len(headings)
+    shaped = unmeasured and has_reckoning(samples, flight)
     return replace(
         flight_features(samples, flight),
         fix_gap=float(track.t[-1]) - flight.end,
@@ -76,7 +82,9 @@ def track_features(samples: Samples, flight: Flight, track: Track) -> DiveFeatur
         ground_speed=float(np.hypot(*track.x[-1])) / interval,
         heading_steadiness=float(np.hypot(*mean)) * interval / max(flown, 1.0),
         heading_mean=atan2(mean[0], mean[1]),
-        heading_commanded=len(commanded) / len(headings) if len(commanded) else 0.0,
+        heading_commanded=len(commanded) / len(headings) if len(commanded) and not shaped else 0.0,
+        heading_reckoned=shaped,
+        heading_assumed=unmeasured and not shaped and not len(commanded),
     )
 
 
