@@ -8,18 +8,17 @@ from __future__ import annotations
 import os
 import re
 import zlib
-from calendar import timegm
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
 from gliderwatch.errors import Quarantine
-from gliderwatch.ingest import logs
+from gliderwatch.ingest import logs, names
 from gliderwatch.ingest.header import open_regular
 from gliderwatch.ingest.logs import LONGEST_LINE, Event, parse_line
 from gliderwatch.model import Aborts, Call, Fix, Happened, Happening
 
-LARGEST = 64_000_000
+LARGEST = 16_000_000
 """Bytes of a log that are read: the longest call of a glider makes some hundred kilobytes."""
 _PIECE = 1 << 16
 _HEAD = 512
@@ -27,7 +26,6 @@ _MOST = 50
 """Files, happenings and names kept of one log."""
 _APART = 2 * 86400.0
 """Seconds by which the glider's clock may be off the server's; a time further off is garbled."""
-_STAMP = re.compile(r"(?<!\d)(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)(?!\d)", re.ASCII)
 _ENDS = re.compile(rb"\r\n|\n|\r")
 _PROMPT = re.compile(rb"GliderDos [AIN] -?\d{1,3} ?>\s*\Z")
 
@@ -51,29 +49,9 @@ class Dialog:
     by_pilot: bool = False
 
 
-def is_log(name: str) -> bool:
-    """Whether a file of this name is the log of a call.
-
-    >>> is_log("unit_1033_20250126T072155_network_net_0.log"), is_log("notes.log")
-    (True, False)
-    """
-    return name.lower().endswith(".log") and stamp(name) is not None
-
-
-def stamp(name: str) -> float | None:
-    """The server's time (s) in the name of a log; None where there is none."""
-    match = _STAMP.search(name)
-    if match is None:
-        return None
-    year, month, day, hour, minute, second = (int(group) for group in match.groups())
-    if not (1990 <= year <= 2100 and 1 <= month <= 12 and 1 <= day <= 31 and hour < 24 and minute < 60):
-        return None
-    return float(timegm((year, month, day, hour, minute, second, 0, 0, 0)))
-
-
 def begun(name: str) -> Dialog:
     """The dialog of a log of which nothing is read."""
-    t = stamp(name) or 0.0
+    t = names.stamp(name) or 0.0
     return Dialog(Call("", name, t, t), t=t)
 
 
@@ -163,7 +141,7 @@ def _told(call: Call, event: Event, t: float) -> Call:
 
 def _timed(dialog: Dialog, t: float) -> Dialog:
     """The dialog at a time (s) of the glider; one that cannot be is garbled."""
-    call, at = dialog.call, stamp(dialog.call.log)
+    call, at = dialog.call, names.stamp(dialog.call.log)
     if at is not None and abs(t - at) > _APART:
         return dialog
     first = dialog.t == call.began == call.last_t == (at or 0.0)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from calendar import timegm
 from pathlib import PurePath
 
 _FLIGHT = {"sbd": "sbd", "mbd": "mbd", "dbd": "dbd", "scd": "sbd", "mcd": "mbd", "dcd": "dbd"}
 _CACHE = frozenset({"cac", "ccc"})
 _RANKS = {"sbd": 0, "mbd": 1, "dbd": 2}
+_STAMP = re.compile(r"(?<!\d)(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)(?!\d)", re.ASCII)
 _SEGMENT = re.compile(r"(?P<glider>.+)-\d{4}-\d{1,3}-\d{1,5}-\d{1,5}", re.ASCII | re.DOTALL)
 
 
@@ -51,3 +53,23 @@ def is_long(name: str) -> bool:
     (True, False)
     """
     return glider_of(PurePath(name).stem) is not None
+
+
+def is_log(name: str) -> bool:
+    """Whether a file of this name is the log of a call.
+
+    >>> is_log("unit_1033_20250126T072155_network_net_0.log"), is_log("notes.log")
+    (True, False)
+    """
+    return name.lower().endswith(".log") and stamp(name) is not None
+
+
+def stamp(name: str) -> float | None:
+    """The server's time (s) in the name of a log; None where there is none."""
+    match = _STAMP.search(name)
+    if match is None:
+        return None
+    year, month, day, hour, minute, second = (int(group) for group in match.groups())
+    if not (1990 <= year <= 2100 and 1 <= month <= 12 and 1 <= day <= 31 and hour < 24 and minute < 60):
+        return None
+    return float(timegm((year, month, day, hour, minute, second, 0, 0, 0)))

@@ -1,6 +1,6 @@
 """Where the data of gliders lie on a dockserver, and what is there now. Nothing is ever written there.
 
-Files count when they lie below a folder `from-glider` of a root, as in
+Files count when they lie below a folder `from-glider` of a root, or `logs` beside it, as in
 `ROOT/GLIDER/from-glider` or `ROOT/GROUP/gliders/GLIDER/from-glider`, or below an explicit path of
 a glider. Symbolic links below these are not followed; the paths themselves may be links. What has the name
 of flight data and is no regular file (a link, a FIFO, a folder) is found too: to be named, never opened.
@@ -18,6 +18,8 @@ from pathlib import Path
 from gliderwatch.ingest import names
 
 FROM_GLIDER = "from-glider"
+LOGS = "logs"
+"""Folder beside `from-glider` with the logs of calls."""
 IGNORED = frozenset({"unknown", "archive"})
 """Folders whose files are noise, or old."""
 _DEEPEST = 6
@@ -40,7 +42,8 @@ class Place:
             return None
         if self.glider:
             return self.glider
-        return (self.path.name, *parts)[parts.index(FROM_GLIDER)] if FROM_GLIDER in parts else None
+        folder = LOGS if names.is_log(path.name) else FROM_GLIDER
+        return (self.path.name, *parts)[parts.index(folder)] if folder in parts else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +76,8 @@ def is_folder(path: Path) -> bool:
 def find_places(roots: Sequence[str | Path], explicit: Mapping[str, Sequence[str | Path]]) -> list[Place]:
     """The places of a configuration now; explicit ones first, so that they decide for their files."""
     places = [Place(path, glider) for glider, paths in explicit.items() for path in expand(paths)]
+    beside = [Place(p.path.with_name(LOGS), p.glider) for p in places if p.path.name == FROM_GLIDER]
+    places += [place for place in beside if is_folder(place.path)]
     return places + [Place(path) for path in expand(roots)]
 
 
@@ -106,7 +111,9 @@ def _scan(
         yield from _files(entries, glider_folder)
     folders = {entry.name for entry in entries if entry.is_dir(follow_symlinks=False)}
     if FROM_GLIDER in folders and not glider_folder:
-        yield from _scan(folder / FROM_GLIDER, folder.name, depth + 1, seen, unread)
+        for name in sorted(folders & {FROM_GLIDER, LOGS}):
+            below = _scan(folder / name, folder.name, depth + 1, seen, unread)
+            yield from (found for found in below if names.is_log(found.path.name) == (name == LOGS))
     elif depth < _DEEPEST:
         for name in sorted(folders):
             if name.lower() not in IGNORED:
@@ -115,7 +122,7 @@ def _scan(
 
 def _files(entries: Iterable[os.DirEntry[str]], glider_folder: str) -> Iterator[Found]:
     for entry in entries:
-        if names.kind(entry.name) is None:
+        if names.kind(entry.name) is None and not names.is_log(entry.name):
             continue
         try:
             status = entry.stat(follow_symlinks=False)

@@ -19,8 +19,8 @@ class _Entry:
 class Settling:
     """Holds files back until they are complete, and lets each state of a file pass once.
 
-    A long name is complete at once; an 8.3 name when size and mtime have been still for
-    `settle_seconds`. What mtime says is never compared with a clock, for it is the glider's.
+    A long name is complete at once, and a log is read as it grows; an 8.3 name when size and mtime have
+    been still for `settle_seconds`. What mtime says is never compared with a clock, for it is the glider's.
     `now` is in seconds of any clock that does not jump (monotonic).
     """
 
@@ -36,7 +36,8 @@ class Settling:
         if self._passed.get(path) == state or (entry and (entry.size, entry.mtime_ns) == state):
             return
         self._passed.pop(path, None)
-        wait = 0.0 if names.is_long(path.name) else self.settle_seconds
+        at_once = names.is_long(path.name) or names.is_log(path.name)
+        wait = 0.0 if at_once else self.settle_seconds
         self._waiting[path] = _Entry(size, mtime_ns, now + wait)
 
     def ready(self, now: float) -> list[Path]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from gliderwatch.currents.field import Field
 from gliderwatch.errors import GliderwatchError, NotAssessed
+from gliderwatch.ingest.calls import Dialog
 from gliderwatch.model import Alert, Assessment, Segment, SegmentId
 from gliderwatch.params import Attention, GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
@@ -14,6 +15,7 @@ from gliderwatch.rules import overdue, silence, unknown
 from gliderwatch.rules.announce import due
 from gliderwatch.rules.muting import with_mute
 from gliderwatch.run.posting import post_alerts, withdraw_answered
+from gliderwatch.store.codec import plain_encode
 from gliderwatch.store.sqlite import File, Status, Store
 
 
@@ -83,6 +85,26 @@ def note(store: Store, file: File, params: GliderParams, speaking: Speaking | No
         if file.opened_at is not None and file.status != Status.UNKNOWN:
             store.hear(SegmentId(file.opened_at, file.glider, file.segment), None, now)
         alerts = _speak(store, file.glider, params, speaking, now) if file.glider else ()
+    return Taken(file, alerts=alerts)
+
+
+def take_log(
+    store: Store,
+    file: File,
+    dialog: Dialog | None,
+    params: GliderParams,
+    speaking: Speaking | None,
+    now: float,
+) -> Taken:
+    """Keep what the log of a call tells by `now` (s), and say what is to be said.
+
+    `dialog` is None where the log could not be read.
+    """
+    with store.transaction():
+        store.note(file, now)
+        if dialog is not None:
+            store.calls.keep(file.path, dialog.call, plain_encode(dialog), now)
+        alerts = _speak(store, file.glider, params, speaking, now) if file.status is Status.TAKEN else ()
     return Taken(file, alerts=alerts)
 
 

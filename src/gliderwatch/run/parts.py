@@ -105,6 +105,7 @@ def build(
         config.dockserver.cache,
         news,
         config.dockserver.observer,
+        logs=config.dockserver.logs,
     )
     ocean, speaks = Ocean(config), speaking(config)
     if before is None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import structlog
 
 from gliderwatch.errors import Quarantine, StateError
+from gliderwatch.ingest import names
 from gliderwatch.model import Alert, Segment
 from gliderwatch.run import arrivals, intake, logs
 from gliderwatch.run.backlog import Job
@@ -41,6 +42,9 @@ class Reception:
 
     def judge(self, path: Path) -> None:
         """Look at a file that has settled: it is queued for the decoder, or noted for what it is."""
+        if names.is_log(path.name):
+            self._take_log(path)
+            return
         caches = self._parts.decoder.cache_folders
         found = arrivals.judge(path, self._store, caches, self._is_known)
         if isinstance(found, Job):
@@ -129,6 +133,20 @@ class Reception:
             self._note(arrivals.failed(file, error))
         else:
             self._told(taken, time.monotonic() - begun)
+
+    def _take_log(self, path: Path) -> None:
+        """Read on in the log of a call."""
+        found = arrivals.judge_log(path, self._store, self._is_known)
+        if found is None:
+            return
+        file, dialog = found
+        params, speaking = self._parts.config.glider(file.glider), self._speaking(file.glider)
+        before = self._store.file(file.path)
+        taken = intake.take_log(self._store, file, dialog, params, speaking, time.time())
+        if before is None or before.status != file.status:  # not once for each line that comes
+            self._told(taken)
+        else:
+            self.alerted(taken.alerts)
 
     def _note(self, file: File) -> None:
         """Write down what became of a file that is not taken (now), if that is new."""

@@ -6,7 +6,7 @@ import math
 import tempfile
 import threading
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -28,6 +28,7 @@ from gliderwatch.run.intake import Speaking
 from gliderwatch.run.life import alive_path
 from gliderwatch.run.lines import alert_line, assessment_line, write_lines
 from gliderwatch.run.ocean import Ocean
+from gliderwatch.run.replay_logs import Log, find_logs, read_logs
 from gliderwatch.run.speaking import NOBODY, speaking
 from gliderwatch.run.turns import Turns
 from gliderwatch.store.database import MEMORY
@@ -86,21 +87,28 @@ def replay(
 ) -> Report:
     """Replay the files of some folders in the order of time. Raises GliderwatchError where there are none."""
     files = find_files(request.folders)
-    if not files:
+    has_logs = request.config is None or request.config.dockserver.logs
+    logs = find_logs(request.folders) if has_logs else []
+    if not files and not logs:
         where = ", ".join(map(str, request.folders))
-        raise GliderwatchError(f"no flight data files (sbd, scd, mbd, mcd, dbd, dcd) below {where}")
-    on_total(len(files))
+        raise GliderwatchError(f"no flight data files (sbd, scd, mbd, mcd, dbd, dcd) or logs below {where}")
+    on_total(len(files) + len(logs))
     caches = cache_folders(request)
     with _state(request) as path:
         ocean = None if request.config is None else Ocean(request.config)
         report = Report(Store.open(path, durable=False), ocean)
         with _speaking(request, path, report) as told:
             jobs = _triage(files, report, caches, request, on_file)
-            _check_glider(request, jobs, report.store)
+            calls = deque(read_logs(logs, report.store, request.is_wanted))
+            _check_glider(request, jobs, calls, report.store)
             turns = Turns(jobs)
             for decoded in _decoded(jobs, caches, workers):
                 for job, sent in turns.after(decoded):
+                    while calls and calls[0].sent <= sent:
+                        _take_log(calls.popleft(), report, request, told, on_file)
                     _take(job, sent, report, request, told, on_file)
+            for call in calls:
+                _take_log(call, report, request, told, on_file)
         if request.out is not None:
             _write(request.out, report.store)
     return report
@@ -213,10 +221,10 @@ def _triage(
     return sorted(jobs, key=lambda j: (j.header.id, -names.rank(j.header.kind), j.file.path))
 
 
-def _check_glider(request: Request, jobs: Sequence[Job], store: Store) -> None:
+def _check_glider(request: Request, jobs: Sequence[Job], calls: Iterable[Log], store: Store) -> None:
     """Raises GliderwatchError where the glider asked for has no files, but others have."""
     others = sorted({file.glider for file in store.files(Status.UNKNOWN)})
-    asked = {job.header.id.glider for job in jobs}
+    asked = {job.header.id.glider for job in jobs} | {call.file.glider for call in calls}
     if request.glider is not None and others and request.glider not in asked:
         raise GliderwatchError(f"no files of glider {request.glider}, but of: {', '.join(others)}")
 
@@ -248,6 +256,20 @@ def _take(
         taken = intake.take(report.store, job.file, job.result, params, told, sent, ocean=ocean)
     except (Quarantine, Retry) as error:
         taken = intake.note(report.store, arrivals.failed(job.file, error), params, told, sent)
+    _count(replace(taken, alerts=(*ticked, *taken.alerts)), report, on_file)
+
+
+def _take_log(
+    log: Log,
+    report: Report,
+    request: Request,
+    told: Speaking,
+    on_file: Callable[[intake.Taken], None],
+) -> None:
+    """Let the clock run until a call was over, and take its log."""
+    ticked = _tick(log.file.glider, report, told, log.sent) if log.file.status is Status.TAKEN else []
+    params = request.params(log.file.glider)
+    taken = intake.take_log(report.store, log.file, log.dialog, params, told, log.sent)
     _count(replace(taken, alerts=(*ticked, *taken.alerts)), report, on_file)
 
 

@@ -15,7 +15,7 @@ from gliderwatch.store import conversion
 
 __all__ = ["MEMORY", "SCHEMA", "StateError", "connect", "guarded", "read_only", "schema"]
 
-SCHEMA = 5
+SCHEMA = 6
 DELIVERY_BY_WORDS = """CASE
     WHEN delivered_at IS NULL THEN 'pending' WHEN error = '' THEN 'delivered'
     WHEN error LIKE 'withdrawn: %' THEN 'withdrawn' WHEN error LIKE 'given up: %' THEN 'unreadable'
@@ -73,6 +73,18 @@ UPDATE files SET hindrance = CASE WHEN status = 'duplicate' AND reason = 'was re
     WHEN status = 'quarantined' AND reason LIKE 'cannot be assessed%' THEN 'not_assessed'
     WHEN status = 'quarantined' THEN 'damaged' ELSE '' END;
 CREATE INDEX files_by_segment ON files (glider, segment);
+""",
+    6: """
+CREATE TABLE calls (              -- what the log of each call has told
+    path   TEXT PRIMARY KEY,
+    glider TEXT NOT NULL,         -- as the log says; empty while it has not
+    began  REAL NOT NULL,         -- by the glider's clock, as is last_t
+    last_t REAL NOT NULL,
+    at     REAL NOT NULL,         -- when it came
+    call   TEXT NOT NULL,         -- `model.Call`
+    dialog TEXT NOT NULL          -- how far it is read: `ingest.calls.Dialog`
+) STRICT;
+CREATE INDEX calls_in_order ON calls (glider, last_t);
 """,
 }
 """SQL that leads from the schema before to the one of the key. It may call the functions of

@@ -6,7 +6,7 @@ import sqlite3
 from collections.abc import Iterator
 
 from gliderwatch.alerts.unknown import Unjudged
-from gliderwatch.model import Assessment, Expected, Hindrance, Incident, Unusable
+from gliderwatch.model import Assessment, Call, Expected, Hindrance, Incident, Unusable
 from gliderwatch.rules.silence import Sign
 from gliderwatch.store.rows import values
 
@@ -99,9 +99,18 @@ class Known:
             yield Unjudged(row[0], row[1], Unusable.DATA_MISSING, "its file holds no data")
 
     def signs(self, since: float) -> tuple[Sign, ...]:
-        """Its files that were opened at `since` (s) or later."""
-        sql = "SELECT opened_at, last_t, at FROM heard WHERE glider = ? AND opened_at >= ?"
-        return tuple(Sign(*row) for row in self._db.execute(sql, (self.glider, since)))
+        """Its files that were opened at `since` (s) or later, and its calls since then."""
+        sql = (
+            "SELECT opened_at, last_t, at, 0 FROM heard WHERE glider = ?1 AND opened_at >= ?2 "
+            "UNION ALL SELECT began, last_t, at, 1 FROM calls WHERE glider = ?1 AND last_t >= ?2"
+        )
+        rows = self._db.execute(sql, (self.glider, since))
+        return tuple(Sign(row[0], row[1], row[2], bool(row[3])) for row in rows)
+
+    def calls(self, since: float) -> tuple[Call, ...]:
+        """Its calls that went on at `since` (s) or later, in order of time."""
+        sql = "SELECT call FROM calls WHERE glider = ? AND last_t >= ? ORDER BY began, path"
+        return tuple(values(self._db, sql, (self.glider, since), Call))
 
 
 def _of_dive(dive: Assessment) -> Unjudged:

@@ -11,6 +11,7 @@ from gliderwatch.model import Alert, Assessment, Expected, Incident, SegmentId, 
 from gliderwatch.pipeline import Outcome
 from gliderwatch.rules.announce import Said
 from gliderwatch.store import codec, outbox, retention
+from gliderwatch.store.calls import Calls
 from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, read_only
 from gliderwatch.store.known import Known
 from gliderwatch.store.notes import Notes
@@ -26,6 +27,7 @@ class Store:
     def __init__(self, connection: sqlite3.Connection, path: Path | str = MEMORY) -> None:
         self._db, self._path = connection, path
         self.segments, self.notes = Segments(connection), Notes(connection)
+        self.calls = Calls(connection)
 
     @classmethod
     def open(cls, path: Path | str, *, durable: bool = True) -> Store:
