@@ -14,7 +14,9 @@ from typing import Protocol
 
 from gliderwatch.alerts import message
 from gliderwatch.model import Alert, Assessment, Expected, Incident
+from gliderwatch.rules.aborts import Episode
 from gliderwatch.rules.acknowledged import Acks
+from gliderwatch.rules.calls import Empty
 from gliderwatch.rules.overdue import Silence
 from gliderwatch.rules.unknown import Unknown
 
@@ -45,13 +47,16 @@ class Said:
     """What people have been told of one glider.
 
     ``surfaced`` is the surfacing of the last notice (s), ``silences`` what was told of its staying away
-    (`rules.overdue`), ``unknown`` of dives that could not be judged (`rules.unknown`).
+    (`rules.overdue`), ``unknown`` of dives that could not be judged (`rules.unknown`), ``aborts`` of aborts
+    (`rules.aborts`), ``empty`` of calls without a file (`rules.calls`).
     """
 
     threads: tuple[Thread, ...] = ()
     surfaced: float | None = None
     silences: tuple[Silence, ...] = ()
     unknown: Unknown | None = None
+    aborts: tuple[Episode, ...] = ()
+    empty: Empty | None = None
 
 
 class Known(Protocol):
@@ -112,8 +117,8 @@ def due(
 
 
 def unanswered(said: Said, incidents: tuple[Incident, ...], acks: Acks) -> frozenset[str]:
-    """The threads of what goes on and nobody has taken on: incidents, and gliders that stay away or cannot
-    be judged."""
+    """The threads of what goes on and nobody has taken on: incidents, and gliders that stay away, cannot be
+    judged, have aborted, or call and send nothing."""
     matched = _matched(said.threads, incidents)
     threads = {
         thread.id
@@ -124,6 +129,9 @@ def unanswered(said: Said, incidents: tuple[Incident, ...], acks: Acks) -> froze
     }
     if said.unknown is not None and not said.unknown.is_over:
         threads.add(said.unknown.id)
+    threads |= {episode.id for episode in said.aborts if episode.cleared is None}
+    if said.empty is not None and not said.empty.is_over:
+        threads.add(said.empty.id)
     return frozenset(threads | {silence.id for silence in said.silences if silence.called is None})
 
 

@@ -11,12 +11,14 @@ from gliderwatch.ingest.calls import Dialog
 from gliderwatch.model import Alert, Assessment, Segment, SegmentId
 from gliderwatch.params import Attention, GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
-from gliderwatch.rules import overdue, silence, unknown
-from gliderwatch.rules.announce import due
+from gliderwatch.rules import aborts, overdue, silence, unknown
+from gliderwatch.rules import calls as without_files
+from gliderwatch.rules.announce import Said, due
 from gliderwatch.rules.muting import with_mute
+from gliderwatch.rules.silence import GONE
 from gliderwatch.run.posting import post_alerts, withdraw_answered
 from gliderwatch.store.codec import plain_encode
-from gliderwatch.store.sqlite import File, Status, Store
+from gliderwatch.store.sqlite import File, Known, Status, Store
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,6 +178,14 @@ def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: 
         raise NotAssessed(f"cannot be assessed, please report it ({segment.id.name}: {what})") from error
 
 
+def _speak_of_calls(said: Said, known: Known, now: float) -> tuple[Said, list[Alert]]:
+    """What is to be said of what a glider told in its calls."""
+    calls = known.calls(now - GONE)
+    episodes, alerts = aborts.announce(known.glider, said.aborts, calls, now)
+    empty, more = without_files.announce(known.glider, said.empty, calls, known.signs(now - GONE), now)
+    return replace(said, aborts=episodes, empty=empty), [*alerts, *more]
+
+
 def _speak(
     store: Store, glider: str, params: GliderParams, speaking: Speaking | None, now: float
 ) -> tuple[Alert, ...]:
@@ -196,6 +206,8 @@ def _speak(
     )
     blind, more = unknown.announce(said.unknown, known, attention, params.rules.reminder_hours, now)
     said, alerts = replace(said, unknown=blind), [*heard, *alerts, *more]
+    said, more = _speak_of_calls(said, known, now)
+    alerts += more
     if said != before or alerts:
         post_alerts(store, glider, said, alerts, speaking.channels, now)
     return tuple(alerts)
