@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from gliderwatch.ingest.calls import Dialog
 from gliderwatch.ingest.decode import decode
 from gliderwatch.ingest.header import read_header
-from gliderwatch.model import Alert, Kind, Segment, SegmentId, Severity
+from gliderwatch.model import Alert, Call, Kind, Segment, SegmentId, Severity
 from gliderwatch.params import Attention, GliderParams
 from gliderwatch.rules.waiting import Wait
 from gliderwatch.run import intake
@@ -366,3 +367,27 @@ class TestQuiet:
     def test_off_for_a_month(self, fleet) -> None:
         live, _, due = silent(fleet)
         assert live.tick(due + 31 * DAY) == []
+
+
+def test_a_glider_that_calls_and_sends_no_file_is_not_overdue(
+    fleet: tuple[Path, list[tuple[Path, Segment]]],
+) -> None:
+    def silence(*, calls: bool) -> set[str]:
+        live, said = Live(), set[str]()
+        for _, segment in fleet[1]:
+            if segment.id.glider == "angus" and segment.last_t <= START + DAY:
+                said |= set(live.take(segment))
+        for k in range(1, 13):
+            t = live.now + 6 * HOUR
+            said |= set(live.until(t))
+            if calls:
+                call = Call("angus", f"{k}.log", t, t + 200, over=True, mission="a.mi", mission_t=t)
+                file = File(f"/{k}.log", 1, 1, Status.TAKEN, "angus")
+                dialog = Dialog(call)
+                taken = intake.take_log(live.store, file, dialog, GliderParams(), live.speaking, t + 200)
+                said |= {str(a.kind) for a in taken.alerts}
+            live.now = t + 200
+        return said
+
+    assert Kind.OVERDUE in silence(calls=False)
+    assert silence(calls=True) == {Kind.CALL}
