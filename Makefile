@@ -80,7 +80,8 @@ wheelhouse: $(VENV)/installed sbom ## everything a machine without internet need
 	rm -rf $(WHEELHOUSE)
 	$(PIP) download --quiet --require-hashes $(WHEELS) -r requirements.lock -d $(WHEELHOUSE)
 	$(PIP) wheel --quiet --no-deps --no-build-isolation --no-index -w $(WHEELHOUSE) .
-	cp -r requirements.lock config systemd docs/install.md docs/configuration.md $(WHEELHOUSE)
+	cp -r requirements.lock config systemd docs README.md CONTRIBUTING.md CHANGELOG.md LICENSE $(WHEELHOUSE)
+	mkdir $(WHEELHOUSE)/benchmarks && cp benchmarks/*.md $(WHEELHOUSE)/benchmarks
 	cp dist/gliderwatch.cdx.json $(WHEELHOUSE)
 	tar -C dist -czf dist/gliderwatch-wheelhouse.tar.gz wheelhouse
 	@echo "dist/gliderwatch-wheelhouse.tar.gz: for $$($(BIN)/python -V) on $$(uname -m); see docs/install.md"

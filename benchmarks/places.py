@@ -27,6 +27,8 @@ class Places:
         return [
             ("root unmounted, and back", self._root),
             ("folder of caches away, and back", self._caches),
+            ("cache files cut or changed, and back", self._bad_caches),
+            ("bad cache files beside the good ones", self._more_caches),
         ]
 
     def _root(self) -> Lane:
@@ -50,6 +52,31 @@ class Places:
             yield self.between(2.0, 12.0)
         finally:
             away.rename(cache)
+
+    def _bad(self, text: bytes) -> bytes:
+        """A list as no glider wrote it: empty, cut, or with two sensors in each other's place."""
+        exchanged = text.replace(b"m_heading", b"m_x").replace(b"m_pitch ", b"m_heading ")
+        return self.storm.chance.choice([b"", text[: len(text) // 2], exchanged.replace(b"m_x", b"m_pitch")])
+
+    def _bad_caches(self) -> Lane:
+        good = {path: path.read_bytes() for path in self.site.cache.iterdir()}
+        for path, text in good.items():
+            path.write_bytes(self._bad(text))
+        try:
+            yield self.between(2.0, 12.0)
+        finally:
+            for path, text in good.items():
+                path.write_bytes(text)
+
+    def _more_caches(self) -> Lane:
+        more = {path.with_name(path.stem.upper() + ".CAC"): path for path in self.site.cache.iterdir()}
+        for bad, path in more.items():
+            bad.write_bytes(self._bad(path.read_bytes()))
+        try:
+            yield self.between(2.0, 12.0)
+        finally:
+            for bad in more:
+                bad.unlink()
 
 
 class Enemy:

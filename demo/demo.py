@@ -75,7 +75,9 @@ def free_port() -> int:
 def play(dockserver: Path, console: Console) -> None:
     """Let a simulated fleet send its files as time passes, and show them as they come."""
     command = [GLIDERWATCH, "simulate", dockserver, *FLEET, "--live", "--speedup", str(SPEEDUP)]
-    fleet = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    fleet = subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+    )
     seen: set[Path] = set()
     told = False
     try:
@@ -91,8 +93,9 @@ def play(dockserver: Path, console: Console) -> None:
                 console.print(f"{day}  {path.parts[-3]} sent {path.name}", highlight=False)
     finally:
         fleet.terminate()
-        if fleet.wait() not in (0, -signal.SIGTERM):
-            sys.exit("the simulation failed: try it with `gliderwatch simulate`")
+        ended = fleet.wait()
+    if ended not in (0, -signal.SIGTERM):
+        sys.exit("the simulation failed: try it with `gliderwatch simulate`")
 
 
 def onset(dockserver: Path) -> float:
@@ -101,10 +104,18 @@ def onset(dockserver: Path) -> float:
     return float(truth["gliders"][0]["faults"][0]["onset_seconds"])
 
 
+def gliderwatch(*words: str | Path, quiet: bool = False) -> int:
+    """Run the installed command, which Ctrl-C here does not reach; its exit code."""
+    out = subprocess.DEVNULL if quiet else None
+    return subprocess.run(
+        [GLIDERWATCH, *words], check=False, stdout=out, stderr=out, start_new_session=True
+    ).returncode
+
+
 def wait_for_status(config: Path) -> None:
     """Until the daemon gives a sign of life."""
     deadline = time.monotonic() + PATIENCE
-    while subprocess.run([GLIDERWATCH, "status", "-c", config], check=False, capture_output=True).returncode:
+    while gliderwatch("status", "-c", config, quiet=True):
         if time.monotonic() > deadline:
             sys.exit("the daemon does not start: see what it said above")
         time.sleep(0.2)
@@ -112,7 +123,7 @@ def wait_for_status(config: Path) -> None:
 
 def main() -> int:
     """Run the demo; 0 when the alert arrived."""
-    console = Console(width=100)
+    console = Console(width=80)
     mailbox = Mailbox(console)
     port = free_port()
     server = Controller(mailbox, hostname="127.0.0.1", port=port)
@@ -124,10 +135,13 @@ def main() -> int:
         for part in ("gliders", "cache"):
             (folder / "dockserver" / part).mkdir(parents=True)
         console.rule("a dockserver, two gliders, one daemon")
-        subprocess.run([GLIDERWATCH, "check", "-c", config], check=True)
+        if gliderwatch("check", "-c", config):
+            return 1
         with (folder / "daemon.log").open("wb") as log:
             environment = dict(os.environ, PYTHONUNBUFFERED="1")
-            daemon = subprocess.Popen([GLIDERWATCH, "run", "-c", config], stderr=log, env=environment)
+            daemon = subprocess.Popen(
+                [GLIDERWATCH, "run", "-c", config], stderr=log, env=environment, start_new_session=True
+            )
         try:
             wait_for_status(config)
             play(folder / "dockserver", console)
@@ -135,7 +149,7 @@ def main() -> int:
             while not mailbox.mails and time.monotonic() < deadline:
                 time.sleep(0.1)
             console.rule("gliderwatch status")
-            subprocess.run([GLIDERWATCH, "status", "-c", config], check=False)
+            gliderwatch("status", "-c", config)
         finally:
             daemon.send_signal(signal.SIGTERM)
             daemon.wait(10)
@@ -147,4 +161,8 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:  # Ctrl-C; what was started has been stopped by then
+        print("stopped", file=sys.stderr)
+        sys.exit(130)

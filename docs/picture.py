@@ -26,8 +26,8 @@ from rich.text import Text
 
 HERE = Path(__file__).resolve().parent
 GLIDERWATCH = Path(sys.executable).with_name("gliderwatch")
-COLUMNS = 96
-"""Columns of the terminal: the link to the map fits in one line."""
+COLUMNS = 80
+"""Columns of the terminal."""
 FONT = "'DejaVu Sans Mono', Menlo, Consolas, monospace"
 
 
@@ -58,21 +58,12 @@ def replay() -> Replay:
     demo = runpy.run_path(str(HERE.parent / "demo" / "demo.py"))
     with tempfile.TemporaryDirectory(prefix="gliderwatch-picture-") as folder:
         root = Path(folder)
-        config = demo["CONFIGURATION"].format(folder=root, port=25)
-        (root / "gliderwatch.yml").write_text(config, encoding="utf-8")
         simulate = ["simulate", "dockserver", *demo["FLEET"]]
-        watch = [
-            "run",
-            "-c",
-            "gliderwatch.yml",
-            "--replay",
-            f"dockserver/gliders/{demo['HURT']}",
-            "--out",
-            "out",
-        ]
+        folder_of_glider = f"dockserver/gliders/{demo['HURT']}"
+        watch = ["run", "--replay", folder_of_glider, "--cache", "dockserver/cache", "--out", "results"]
         _run(simulate, root)
         printed = _run(watch, root)
-        written = [_lines(root / "out" / f"{what}.jsonl") for what in ("assessments", "alerts")]
+        written = [_lines(root / "results" / f"{what}.jsonl") for what in ("assessments", "alerts")]
         truth = _truth_of_first(root / "dockserver" / "truth.nc")
         onset = demo["onset"](root / "dockserver")
     commands = tuple(" ".join(["$ gliderwatch", *words]) for words in (simulate, watch))
@@ -155,7 +146,7 @@ def plot(made: Replay) -> str:
         'font-family="DejaVu Sans, Helvetica, Arial, sans-serif" font-size="13" role="img">',
         "<title>Through-water speed of the demo's faulty glider against its normal range</title>",
         f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#ffffff"/>',
-        *_range(axes, made.assessments[0]),
+        *_range(axes, made.assessments[-1]),
         *_grid(axes),
         *_events(axes, made),
         *_truth(axes, made.truth),

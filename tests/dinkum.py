@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+import zlib
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 
@@ -25,24 +26,64 @@ SENSORS = (
     ("m_gps_status", 1, "enum"),
 )
 UNUSED = (("x_unused", 4, "nodim"),)
+CRC = "0abc12ef"
+"""The checksum of all sensor lists made here where it is not said otherwise."""
 
 Row = Mapping[str, float]
 
 
-def sensor_list(sensors: Sequence[tuple[str, int, str]] = SENSORS) -> bytes:
-    """The text of a cache file: the sensors held, then one that is not."""
+def sensor_list(sensors: Sequence[tuple[str, int, str]] = SENSORS, crc: str = CRC) -> bytes:
+    """The text of a cache file: the sensors held, then one that is not.
+
+    Its unit is such that the checksum of the text is `crc`, so that any list can be put in place of another.
+    """
     held = [f"s: T {i:4d} {i:4d} {size} {name} {unit}\n" for i, (name, size, unit) in enumerate(sensors)]
     rest = [
         f"s: F {i:4d}   -1 {size} {name} {unit}\n"
         for i, (name, size, unit) in enumerate(UNUSED, start=len(sensors))
     ]
-    return "".join(held + rest).encode()
+    text = "".join(held + rest).encode().removesuffix(b"\n")
+    return text + _tail(text, int(crc, 16)) + b"\n"
+
+
+def checksum(text: bytes) -> int:
+    """The checksum of a sensor list: CRC-32 without the complement at its end."""
+    return zlib.crc32(text) ^ 0xFFFFFFFF
+
+
+def _tail(text: bytes, aim: int) -> bytes:
+    """Characters after which `text`, and a line end, have the checksum `aim`.
+
+    Each of them is one of two: what the other one changes is the same whatever the rest is, so that 32 that
+    change different things are found by elimination.
+    """
+    n = 35
+
+    def changed(i: int) -> int:
+        tail = bytearray(b"a" * n)
+        tail[i] = ord("b")
+        return checksum(text + tail + b"\n") ^ start
+
+    start = checksum(text + b"a" * n + b"\n")
+    basis: dict[int, tuple[int, int]] = {}  # highest bit: what is changed, and by which characters
+    for i in range(n):
+        value, places = changed(i), 1 << i
+        while value and value.bit_length() in basis:
+            other, by = basis[value.bit_length()]
+            value, places = value ^ other, places ^ by
+        if value:
+            basis[value.bit_length()] = value, places
+    value, places = start ^ aim, 0
+    while value:
+        other, by = basis[value.bit_length()]
+        value, places = value ^ other, places ^ by
+    return bytes(ord("b") if places >> i & 1 else ord("a") for i in range(n))
 
 
 def header(
     full_name: str = "unit_7-2024-250-1-3",
     opened_at: float = OPENED_AT,
-    crc: str = "0abc12ef",
+    crc: str = CRC,
     factored: bool = True,
     n_held: int = len(SENSORS),
     **tags: object,

@@ -10,23 +10,13 @@ from pathlib import Path
 import click
 from rich.console import Console
 
+from gliderwatch.command_options import FILE, config_option, example, json_option
+
 # ruff: noqa: PLC0415
 # A health check must not wait for what these commands need: it is imported in them, as in `cli`.
 
-FILE = click.Path(dir_okay=False, path_type=Path)
-config_option = click.option(
-    "-c",
-    "--config",
-    "config_path",
-    type=FILE,
-    default="/etc/gliderwatch/gliderwatch.yml",
-    help="The YAML configuration.",
-    show_default=True,
-)
-json_option = click.option("--json", "as_json", is_flag=True, help="For machines.")
 
-
-@click.command()
+@click.command(epilog=example("gliderwatch incidents --glider electa --all"))
 @config_option
 @click.option("--glider", help="Only of this glider.")
 @click.option("--all", "every", is_flag=True, help="Also those that are over.")
@@ -49,7 +39,9 @@ def incidents(config_path: Path, glider: str | None, every: bool, as_json: bool)
         click.echo("no incidents" if every else "no open incidents")
 
 
-@click.command()
+@click.command(
+    epilog=example("gliderwatch mute electa --hours 12", "gliderwatch mute electa --until 2026-12-01")
+)
 @click.argument("glider")
 @click.option("--until", help="A date, or a date and time, in UTC.")
 @click.option("--hours", type=float, help="Hours from now on.")
@@ -64,7 +56,7 @@ def mute(config_path: Path, glider: str, until: str | None, hours: float | None)
     click.echo("\n".join(manage.mute(load(config_path), glider, end, now)))
 
 
-@click.command()
+@click.command(epilog=example("gliderwatch unmute electa"))
 @click.argument("glider")
 @config_option
 def unmute(config_path: Path, glider: str) -> None:
@@ -75,13 +67,16 @@ def unmute(config_path: Path, glider: str) -> None:
     click.echo("\n".join(manage.unmute(load(config_path), glider, time.time())))
 
 
-@click.command()
+@click.command(epilog=example("gliderwatch ack electa/anomaly/1667639520 --by Ann"))
 @click.argument("incident")
 @click.option("--by", help="Who takes it on; else the user of this command.")
 @click.option("--note", default="", help="What the others should know.")
 @config_option
 def ack(config_path: Path, incident: str, by: str | None, note: str) -> None:
-    """Acknowledge an incident: no reminders of it until it is over or grows worse."""
+    """Acknowledge an incident: no reminders of it until it is over or grows worse.
+
+    INCIDENT is its id, as `gliderwatch incidents` shows it.
+    """
     import getpass
 
     from gliderwatch import tables
@@ -94,24 +89,29 @@ def ack(config_path: Path, incident: str, by: str | None, note: str) -> None:
     tables.incidents([noted], Console())
 
 
-@click.command()
+@click.command(epilog=example("gliderwatch backup /var/backups/gliderwatch.sqlite"))
 @click.argument("file", type=FILE)
 @config_option
 def backup(config_path: Path, file: Path) -> None:
     """Copy the state to a file while the service runs, and see that the copy is whole."""
     from gliderwatch.config import load
+    from gliderwatch.run.manage.places import not_on_dockserver
     from gliderwatch.store.backup import backup as make
 
-    size = make(Path(load(config_path).state.path), file)
+    config = load(config_path)
+    size = make(Path(config.state.path), not_on_dockserver(config, file))
     click.echo(f"{file}: {size / 1e6:.1f} MB, whole")
 
 
-@click.command()
+@click.command(epilog=example("gliderwatch rebuild electa", "gliderwatch rebuild electa --keep"))
 @click.argument("glider")
 @click.option("--keep", is_flag=True, help="Put the result in place of what is known; the service must rest.")
 @config_option
 def rebuild(config_path: Path, glider: str, keep: bool) -> None:
-    """Assess a glider anew from its files; ends with 1 where that changes something and is not kept."""
+    """Assess a glider anew from its files.
+
+    It ends with 1 where that changes something and is not kept.
+    """
     from rich.progress import Progress
 
     from gliderwatch.config import load

@@ -68,8 +68,8 @@ class Segment:
     ``quantities`` maps names of `docs/nomenclature.md` (``fix_lat``, ``heading``, ``depth``, ...)
     to samples; a quantity the file does not hold is absent. ``completeness`` orders copies of
     one segment: the greater replaces the smaller. ``dropped`` counts values out of physical
-    range per quantity. ``declination`` is the angle from true to magnetic north (rad, east
-    positive), None where neither the file nor a position in it tells.
+    range per quantity, ``notes`` say what was corrected. ``declination`` is the angle from true to
+    magnetic north (rad, east positive), None where neither the file nor a position in it tells.
     """
 
     id: SegmentId
@@ -81,6 +81,7 @@ class Segment:
     declination: float | None = None
     declination_source: str = ""
     dropped: Mapping[str, int] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def get(self, name: str) -> Series:
         """The samples of a quantity, empty where the file has none."""
@@ -220,8 +221,10 @@ class DiveFeatures:
     ``unobserved`` the time without any data. ``ground_speed`` between the fixes and ``onboard_speed``, the
     mean of what the glider believes, in m/s. ``heading_steadiness`` is the length of the mean heading vector
     in flight (0: circled, 1: straight), ``heading_mean`` its direction (rad, clockwise from north),
-    ``heading_commanded`` the part of headings that were commanded, not measured. ``depth_max`` in m; means of
-    ``pitch_dive``, ``pitch_climb``, ``roll_mean`` and the spread ``roll_std`` in rad, nose up and to
+    ``heading_commanded`` the part of headings that were commanded, not measured; ``heading_reckoned``: none
+    were measured, the dead-reckoned way has the shape of the dive; ``heading_assumed``: nothing tells the
+    course. In a dive with ``surfacing_unseen`` the glider surfaced without a fix. ``depth_max`` in m; means
+    of ``pitch_dive``, ``pitch_climb``, ``roll_mean`` and the spread ``roll_std`` in rad, nose up and to
     starboard positive; ``thruster`` the part of the time that it was on; ``depth_rate_dive`` and
     ``depth_rate_climb`` in m/s, down positive; ``yos`` turns from dive to climb; ``ballast_dive`` and
     ``ballast_climb`` the volume pumped (m3); ``vacuum`` in Pa.
@@ -234,6 +237,9 @@ class DiveFeatures:
     heading_steadiness: float | None = None
     heading_mean: float | None = None
     heading_commanded: float = 0.0
+    heading_reckoned: bool = False
+    heading_assumed: bool = False
+    surfacing_unseen: bool = False
     depth_max: float | None = None
     pitch_dive: float | None = None
     pitch_climb: float | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 
 from rich.console import Console
@@ -40,15 +41,23 @@ def _vector(u: float | None, v: float | None) -> str:
     return "" if u is None or v is None else f"{u:+.2f} {v:+.2f}"
 
 
-def dives(assessments: Sequence[Assessment]) -> Table:
-    """The dives of a mission, one a line; 80 columns."""
+LEGEND = """\
+Times are those of the surfacing. h: hours of the dive. speed, ±: through the
+water, and its uncertainty; own: what the glider believes; flow: as estimated;
+DAC: the current it is compared with; all in m/s, E N: east, north. p_E: how far
+flow and DAC differ, 0 to 1."""
+"""What the columns of `dives` are."""
+WIDE = 10_000
+"""Columns of what is no terminal: nothing has to be cut or wrapped."""
+
+
+def dives(assessments: Sequence[Assessment], *, whole: bool = False) -> Table:
+    """The dives of a mission, one a line; 80 columns, for which a long reason is wrapped, unless `whole`."""
     years = sorted({iso(a.t_surface)[:4] for a in assessments})
-    table = Table(
-        f"{'/'.join(years)} UTC", "h", box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold"
-    )
-    table.add_column("flag", max_width=14)
-    for column in table.columns:
-        column.no_wrap = True
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    for name in (f"{'/'.join(years)} UTC", "h"):
+        table.add_column(name, no_wrap=True)
+    table.add_column("flag", max_width=None if whole else 14, no_wrap=whole)
     for name in ("speed", "±", "own", "flow E N", "DAC E N", "p_E"):
         table.add_column(name, justify="right", no_wrap=True)
     for a in assessments:
@@ -66,13 +75,33 @@ def dives(assessments: Sequence[Assessment]) -> Table:
     return table
 
 
+def show(table: Table, console: Console) -> None:
+    """Print a table: it fits a terminal, and is as wide as it needs where there is none."""
+    if not console.is_terminal:
+        console = Console(file=console.file, width=WIDE)
+    console.print(table)
+
+
 def files(counts: dict[Status, int], left_out: Sequence[File], console: Console, most: int = 20) -> None:
-    """What became of files: how many of each status, and why those that were not taken were not."""
+    """What became of files: how many of each status, and why those that were not taken were not.
+
+    Files of one status and reason are told once.
+    """
     console.print("files: " + (", ".join(f"{n} {status}" for status, n in counts.items()) or "none"))
-    for file in left_out[:most]:
-        console.print(Text(f"  {file.status}  {clean(file.path, 500)}: {clean(file.reason)}"), soft_wrap=True)
-    if len(left_out) > most:
-        console.print(f"  and {len(left_out) - most} more")
+    alike = defaultdict[tuple[Status, str], list[File]](list)
+    for file in left_out:
+        alike[file.status, file.reason].append(file)
+    for (status, reason), same in list(alike.items())[:most]:
+        path = clean(same[0].path, 500)
+        text = (
+            f"{path}: {clean(reason, 2000)}"
+            if len(same) == 1
+            else f"{len(same)} files: {clean(reason, 2000)}; such as {path}"
+        )
+        console.print(Text(f"  {status}  {text}"), soft_wrap=True)
+    rest = sum(len(same) for same in list(alike.values())[most:])
+    if rest:
+        console.print(f"  and {rest} more")
 
 
 def status(view: Overview, console: Console) -> None:
@@ -81,13 +110,14 @@ def status(view: Overview, console: Console) -> None:
     state = "[green]alive[/]" if view.alive else "[bold red]NOT RUNNING[/]"
     console.print(f"gliderwatch is {state} (last sign of life: {silent})")
     table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("glider", "surfaced UTC", "lat lon", "flag"):
+    for name in ("glider", "surfaced UTC", "lat lon"):
         table.add_column(name, no_wrap=True)
+    table.add_column("flag", no_wrap=not console.is_terminal)
     for name in ("speed", "range", "dives"):
         table.add_column(name, justify="right", no_wrap=True)
     for glider in view.gliders:
         table.add_row(*_glider(glider))
-    console.print(table)
+    show(table, console)
     for glider in view.gliders:
         for style, text in _next(glider):
             console.print(Text(text, style=style))
@@ -97,12 +127,23 @@ def status(view: Overview, console: Console) -> None:
             text = f"{clean(i.glider)}: {i.kind} open since {utc(i.since)}, {i.dives} dives"
             taken_on = "" if ack is None else f", {acknowledged(ack, i)}"
             console.print(Text(text + taken_on, style=_STYLES[i.severity]))
+    for glider in view.gliders:
+        for each in glider.irregularities:
+            console.print(Text(f"since {utc(each.t)}: {clean(each.title)}", style="yellow"), soft_wrap=True)
     files(view.files, [*view.waiting, *view.quarantined], console)
+    for name, link in view.links.items():
+        text = f"{clean(name, 30)}: {clean(str(link), 600)} ({clean(link.cure, 600)})"
+        console.print(Text(text, style="bold red"), soft_wrap=True)
     if view.unknown:
         names = ", ".join(clean(g) for g in sorted({f.glider for f in view.unknown}))
         console.print(
             Text(f"gliders not in the configuration: {names} ({len(view.unknown)} files left alone)")
         )
+    _messages(view, console)
+
+
+def _messages(view: Overview, console: Console) -> None:
+    """What is held, and what no channel took."""
     for u in view.held:
         until = f"{utc(u.held_until)}{', unless acknowledged' if u.escalates else ' (quiet hours)'}"
         console.print(Text(f"held until {until}: {clean(u.alert)} by {u.channel}"), soft_wrap=True)
@@ -181,6 +222,9 @@ def _dive(a: Assessment) -> str:
 
 
 def problems(found: Sequence[Problem], console: Console) -> None:
-    """What `check` found, the worst first."""
-    for problem in sorted(found, key=lambda p: p.severity):
-        console.print(Text(clean(str(problem), 2000)), soft_wrap=True)
+    """What `check` found, the worst first, each marked for what it is."""
+    for p in sorted(found, key=lambda p: p.severity):
+        text = Text(f"{clean(p.where, 500)}: ")
+        text.append(f"{p.severity}: ", style="bold red" if p.severity == "error" else "yellow")
+        text.append(clean(p.text + (f" ({p.cure})" if p.cure else ""), 2000))
+        console.print(text, soft_wrap=True)

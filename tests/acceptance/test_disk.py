@@ -71,7 +71,9 @@ def test_a_full_disk_is_said_and_when_there_is_room_all_is_taken(site: Site, lim
             small.fill(daemon)
             put(site, *LATE)
             until(lambda: told(daemon), "it says so")
-            time.sleep(PAUSE + 0.5)  # it tries once more
+            time.sleep(2 * PAUSE + 0.5)  # it tries more than once
+            assert len(daemon.log("state cannot be used, tried again")) == 1
+            assert not daemon.log("state can be used again")
             assert daemon.alive() and site.statuses(*(f.name for f in LATE)) == [None] * len(LATE)
             small.free(daemon)
             taken(site, *FILES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import sys
@@ -300,3 +301,27 @@ def test_nothing_below_the_root_changes(site: Site) -> None:
         daemon.stop()
     assert site.tree() == before
     assert sorted(path.name for path in site.cache.iterdir()) == cache
+
+
+def test_a_glider_whose_folder_is_a_link_is_named_in_status_and_its_cure_works(
+    site: Site, tmp_path: Path
+) -> None:
+    target = tmp_path / "disk2" / "angus" / "from-glider"
+    target.mkdir(parents=True)
+    shutil.rmtree(site.root / "angus")
+    (site.root / "angus").symlink_to(target.parent)
+    (target / FILES[0].name).write_bytes(FILES[0].data)
+    with Daemon(site):
+        shown = command("status", "-c", site.config).stdout
+        assert f"angus: {site.root}/angus is a symbolic link, and links are not followed" in shown
+        assert f"(write `paths: [{target}]` below the glider)" in shown
+        link = {"path": f"{site.root}/angus", "target": str(target)}
+        assert site.status()["links"] == {"angus": link}
+    text = site.config.read_text(encoding="utf-8")
+    assert "angus" in text
+    config = json.loads(text)
+    config["gliders"]["angus"] = {"paths": [str(target)]}
+    site.config.write_text(json.dumps(config), encoding="utf-8")
+    with Daemon(site):
+        taken(site, FILES[0])
+        assert site.status()["links"] == {}

@@ -192,15 +192,21 @@ def test_a_copy_is_made_while_the_service_writes_and_can_be_gone_on_from(site: S
         (["mute", "elsa", "--hours", "2"], "known are: bruce"),
         (["unmute", "elsa"], "known are: bruce"),
         (["ack", "bruce/anomaly/1"], "has the daemon run"),
-        (["backup", "copy"], "has the daemon run"),
+        (["backup", "../copy"], "has the daemon run"),
+        (["backup", "copy"], "where the dockserver's files are: nothing is written there"),
+        (["backup", "../cache/copy"], "where the dockserver's files are: nothing is written there"),
+        (["backup", "../link/copy"], "where the dockserver's files are: nothing is written there"),
         (["rebuild", "bruce"], "has the daemon run"),
         (["rebuild", "bruce", "--keep"], "has the daemon run"),
         (["rebuild", "elsa"], "known are: bruce"),
     ],
 )
 def test_what_cannot_be_done_is_told_and_ends_with_2(site: Site, arguments: list[str], told: str) -> None:
+    (site.root.parent / "link").symlink_to(site.root)
+    before = site.tree()
     result = command(*arguments, "-c", site.config, cwd=site.root)
     assert result.returncode == 2
+    assert site.tree() == before
     assert told in result.stderr
     assert TRACEBACK not in result.stderr
     assert not site.state.parent.exists()

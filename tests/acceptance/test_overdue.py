@@ -102,6 +102,27 @@ def test_it_is_told_when_due_once_and_clears_itself(site: Site, tmp_path: Path) 
     assert len(box.times()) == 3
 
 
+def test_files_that_come_at_once_are_told_once_whatever_their_order(site: Site, tmp_path: Path) -> None:
+    """The newest comes first: alone it would tell of a call that was late, with the next of one in time."""
+    flight = fly(tmp_path, time.time() + 12.0)
+    site.caches(flight.mission)
+    due = min(time.time() + 8.0, flight.back - 1.0)
+    with mail_server() as box:
+        configure(site, box, overdue_hours=(due - flight.expected) / HOUR)
+        put(site, *flight.files[:-3])
+        with Daemon(site) as daemon:
+            taken(site, len(flight.files) - 3)
+            until(lambda: box.mails, "a message")
+            until(lambda: time.time() > flight.back + 1.0, "its next surfacing but one")
+            for n, file in enumerate((flight.files[-1], flight.files[-2])):
+                put(site, file)
+                taken(site, len(flight.files) - 2 + n)
+            until(lambda: len(box.times()) > 1, "what became of it")
+            assert daemon.stop() == 0
+    told = [mail.subject.strip() for mail in box.mails]
+    assert len(told) == 2 and told[1].startswith(f"CORRECTION {GLIDER}: it was up in time"), told
+
+
 def test_an_archive_a_mute_and_a_recovery_are_quiet(site: Site, tmp_path: Path) -> None:
     """What would be told without them is told in the end."""
     flight = fly(tmp_path, time.time() - 1.0)

@@ -252,3 +252,42 @@ def test_ci_sees_a_module_skipped_whole(tmp_path: Path) -> None:
     status, output = ci_says(tmp_path, "import pytest\npytest.importorskip('no_such_module')\n" + REAL)
     assert status == 1
     assert "skipped as a whole" in output
+
+
+def test_the_wheelhouse_holds_all_pages_and_no_link_of_theirs_leads_out_of_it(tmp_path: Path) -> None:
+    recipe = run("make", "-n", "wheelhouse", "VENV=" + str(tmp_path / "venv")).stdout
+    copies = [line for line in recipe.splitlines() if re.search(r"\bcp .*dist/wheelhouse", line)]
+    house = tmp_path / "house"
+    house.mkdir()
+    (tmp_path / "dist").mkdir()
+    (tmp_path / "dist" / "gliderwatch.cdx.json").touch()
+    for name in (
+        "requirements.lock",
+        "config",
+        "systemd",
+        "docs",
+        "benchmarks",
+        *(p.name for p in ROOT.glob("*[DEG].md")),
+        "LICENSE",
+    ):
+        (tmp_path / name).symlink_to(ROOT / name)
+    for line in copies:
+        done = run(
+            "sh", "-c", line.replace("dist/wheelhouse", str(house)).replace("cp -r", "cp -rL"), cwd=tmp_path
+        )
+        assert done.returncode == 0, (line, done.stderr)
+    pages = {page.name for page in (ROOT / "docs").iterdir() if page.is_file()}
+    assert pages <= {page.name for page in (house / "docs").iterdir()}
+    for page in house.rglob("*.md"):
+        for link in re.findall(r"\]\(([^)\s#]+)", page.read_text(encoding="utf-8")):
+            if "://" not in link and not link.startswith("mailto:") and page.parent != house / "benchmarks":
+                assert (page.parent / link).exists(), f"{page.relative_to(house)}: {link}"
+
+
+def test_nothing_is_advised_to_be_installed_by_a_name_that_may_be_anothers() -> None:
+    """An index may have another gliderwatch: it is installed from its own archive or checkout alone."""
+    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "src").rglob("*.py")]
+    for page in pages:
+        for line in page.read_text(encoding="utf-8").splitlines():
+            if re.search(r"pip install.*\bgliderwatch(?![/\w-])", line.replace("/opt/gliderwatch", "")):
+                assert "--no-index" in line, f"{page.name}: {line}"

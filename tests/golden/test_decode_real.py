@@ -87,7 +87,6 @@ def test_headers_agree_with_dbdreader(shared_data, mission):
         assert header.crc == info["sensor_list_crc"].lower()
         assert header.factored == bool(info["sensor_list_factored"])
         assert (header.n_sensors, header.n_held) == (info["total_num_sensors"], info["sensors_per_cycle"])
-        assert header.eightthree == info["the8x3_filename"]
 
 
 def test_values_agree_with_dbdreader(shared_data, decoded, mission):

@@ -81,6 +81,6 @@ def test_the_gliders_are_found_one_after_another(path):
     assert store.gliders() == []
     for name in ("b", "a", "c"):
         for k in range(2):
-            row = (name, k, f"{name}-{k}", "", b"", None, 0)
-            store._db.execute("INSERT INTO segments VALUES (?, ?, ?, ?, ?, ?, ?)", row)
+            row = (name, k, f"{name}-{k}", "", 0, k, 0, 0, b"", None)
+            store._db.execute("INSERT INTO segments VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
     assert store.gliders() == ["a", "b", "c"]

@@ -14,6 +14,7 @@ from pathlib import Path
 from subprocess import run
 from sys import executable
 from typing import Any, cast
+from urllib.parse import quote
 
 import pytest
 from aiosmtpd.controller import Controller
@@ -262,6 +263,33 @@ class TestMail:
             made.stop()
         assert PASSWORD not in str(caught.value) + caplog.text + "".join(capfd.readouterr())
 
+    @pytest.mark.parametrize("offered", ["PLAIN", "LOGIN", "both"])
+    @pytest.mark.parametrize("name", ["watch", "Wächter"])
+    def test_login_with_letters_beyond_ascii(self, offered: str, name: str) -> None:
+        secret, seen = "Pässwort €5 密", []
+
+        def check(
+            server: SMTP, session: Session, envelope: Envelope, mechanism: str, data: Any
+        ) -> AuthResult:
+            seen.append(mechanism)
+            right = data == LoginPassword(name.encode("utf-8"), secret.encode("utf-8"))
+            return AuthResult(success=right, handled=False)
+
+        hidden = {"PLAIN": ["LOGIN"], "LOGIN": ["PLAIN"], "both": []}[offered]
+        made = Post(
+            auth_require_tls=False, authenticator=check, auth_required=True, auth_exclude_mechanism=hidden
+        ).start()
+        try:
+            login = f"{quote(name)}:{quote(secret)}@"
+            Channel("mail", made.url(login=login)).send(alert())
+            assert len(made.inbox.mails) == 1
+            assert seen == ["PLAIN" if offered == "both" else offered]
+            with pytest.raises(DeliveryError, match="535") as caught:
+                Channel("mail", made.url(login=login.replace("@", "x@"))).send(alert())
+        finally:
+            made.stop()
+        assert secret not in str(caught.value)
+
     def test_a_title_cannot_add_headers(self, post: Post) -> None:
         with pytest.raises(DeliveryError):
             Channel("mail", post.url()).send(alert(title="x\r\nBcc: thief@example.org"))
@@ -426,6 +454,8 @@ class TestUrls:
             f"mailto://watch:{PASSWORD}@example.org?from=not an address&to=pilot@example.org&mode=what",
             f"mailto://watch:{PASSWORD}@example.org?to=no-address",
             "mailto://",
+            "mailto://localhost",
+            "mailto://127.0.0.1:25?smtp=localhost&cc=pilot@example.org",
         ],
     )
     def test_bad_ones_say_so_without_their_secrets(self, url: str) -> None:

@@ -137,17 +137,88 @@ def test_a_bad_cache_file_is_named_and_replaced_when_it_changes(station, content
 
 def test_a_cache_file_that_does_not_fit_is_named(station):
     path, cache = station
-    shorter = dinkum.sensor_list().replace(b"s: T   11   11 1", b"s: F   11   -1 1")
-    (cache / f"{CRC}.cac").write_bytes(shorter)
-    with pytest.raises(Retry, match=f"{CRC}.cac does not fit: it lists 13 sensors and 11"):
+    (cache / f"{CRC}.cac").write_bytes(dinkum.sensor_list(dinkum.SENSORS[:11]))
+    with pytest.raises(Retry, match=f"{CRC}.cac does not fit: it lists 12 sensors and 11"):
         decode(path, [cache])
 
 
-def test_a_cache_file_cut_between_lines_does_not_fit(station):
+def test_a_cache_file_cut_between_lines_is_named(station):
     path, cache = station
     (cache / f"{CRC}.cac").write_bytes(b"".join(dinkum.sensor_list().splitlines(keepends=True)[:6]))
-    with pytest.raises(Retry, match="does not fit: it lists 6 sensors"):
+    with pytest.raises(Retry, match=f"{CRC}.cac cannot be used: it is cut or changed"):
         decode(path, [cache])
+
+
+def test_a_cache_file_with_two_sensors_exchanged_is_named_and_not_used(station):
+    path, cache = station
+    exchanged = dinkum.sensor_list().replace(b"m_heading", b"m_x").replace(b"m_pitch", b"m_heading")
+    (cache / f"{CRC}.cac").write_bytes(exchanged.replace(b"m_x", b"m_pitch"))
+    with pytest.raises(Retry, match=f"{CRC}.cac .*the checksum of its content is [0-9a-f]{{8}}, not {CRC}"):
+        decode(path, [cache])
+
+
+BAD = {
+    "empty": b"",
+    "cut in a line": dinkum.sensor_list()[:100],
+    "cut between lines": dinkum.sensor_list()[: dinkum.sensor_list().index(b"s: T    6")],
+    "another list": dinkum.sensor_list(crc="11111111"),
+    "garbage": b"garbage",
+}
+
+
+@pytest.mark.parametrize("bad", BAD.values(), ids=BAD)
+@pytest.mark.parametrize("good", [f"{CRC}.ccc", f"{CRC.upper()}.CAC", "0aBc12eF.Cac", "0ABC12ef.cCC"])
+def test_a_good_cache_file_is_used_whatever_lies_in_its_way(station, tmp_path, good, bad):
+    path, cache = station
+    expected = decode(path, [cache])
+    content = dinkum.sensor_list()
+    packed = dinkum.compress(content) if good.lower().endswith("ccc") else content
+    (cache / f"{CRC}.cac").write_bytes(bad)
+    (cache / good).write_bytes(packed)
+    assert same(decode(path, [cache]), expected)  # beside the bad one
+    other = tmp_path / "other"
+    other.mkdir()
+    (cache / good).rename(other / good)
+    assert same(decode(path, [cache, other]), expected)  # in the next folder
+
+
+def test_each_cache_file_that_cannot_be_used_is_named_with_what_is_wrong(station, tmp_path):
+    path, cache = station
+    other = tmp_path / "other"
+    other.mkdir()
+    (cache / f"{CRC}.cac").write_bytes(b"")
+    (other / f"{CRC.upper()}.CAC").write_bytes(dinkum.sensor_list(crc="11111111"))
+    (other / f"{CRC}.ccc").mkdir()
+    with pytest.raises(Retry) as caught:
+        decode(path, [cache, other])
+    assert str(caught.value) == (
+        f"cache file {cache}/{CRC}.cac cannot be used: it is empty, or cut at its start; "
+        f"cache file {other}/{CRC.upper()}.CAC cannot be used: it is cut or changed, or is another list: "
+        f"the checksum of its content is 11111111, not {CRC}; "
+        f"cache file {other}/{CRC}.ccc cannot be used: not a regular file but a folder; "
+        "copy it from the glider or the dockserver again"
+    )
+
+
+@pytest.mark.parametrize("change", [b"\r\n", b"\n"], ids=["CRLF", "LF"])
+@pytest.mark.parametrize("padding", [b"", b"\r\n", b"\x1a" * 100, b"\0" * 20], ids=["", "line", "^Z", "0"])
+def test_line_ends_and_padding_of_a_transfer_are_no_other_list(station, change, padding):
+    path, cache = station
+    expected = decode(path, [cache])
+    (cache / f"{CRC}.cac").write_bytes(dinkum.sensor_list().replace(b"\n", change) + padding)
+    assert same(decode(path, [cache]), expected)
+    (cache / f"{CRC}.cac").unlink()
+    packed = dinkum.compress(dinkum.sensor_list().replace(b"\n", change) + padding)
+    (cache / f"{CRC}.ccc").write_bytes(packed)
+    assert same(decode(path, [cache]), expected)
+
+
+def test_a_sensor_list_that_was_damaged_on_its_way_is_not_believed(station):
+    path, _ = station
+    listed = dinkum.sensor_list().replace(b"m_pitch", b"m_pitsh")
+    path.write_bytes(dinkum.header(factored=False) + listed + dinkum.cycles(dinkum.rows()))
+    with pytest.raises(Quarantine, match="damaged in its sensor list"):
+        decode(path, [])
 
 
 def test_a_header_that_lies_about_its_sensor_list_does_not_fit(station):
@@ -169,7 +240,8 @@ def test_an_unfactored_file_needs_no_cache_and_leaves_none(station, tmp_path):
     before = state(tmp_path)
     assert same(decode(path, []), expected) is False  # the header is part of the content
     assert np.array_equal(decode(path, []).get("heading").v, expected.get("heading").v)
-    path.write_bytes(content.replace(b"m_pitch", b"m_pitsh"))
+    other = dinkum.sensor_list(tuple((n.replace("m_pitch", "m_other"), s, u) for n, s, u in dinkum.SENSORS))
+    path.write_bytes(content.replace(dinkum.sensor_list(), other))
     assert "pitch" not in decode(path, []).quantities
     path.write_bytes(dinkum.header() + dinkum.cycles(dinkum.rows()))
     assert same(decode(path, [cache]), expected)  # not spoilt by the sensor list of the other
@@ -225,7 +297,8 @@ def test_a_header_without_values_is_an_empty_segment(station):
 
 def test_a_file_without_times_is_no_use(station):
     path, cache = station
-    (cache / f"{CRC}.cac").write_bytes(dinkum.sensor_list().replace(b"m_present_time", b"m_absent_timeX"))
+    sensors = (("m_absent_timeX", 8, "s"), *dinkum.SENSORS[1:])
+    (cache / f"{CRC}.cac").write_bytes(dinkum.sensor_list(sensors))
     with pytest.raises(Quarantine, match="m_present_time"):
         decode(path, [cache])
 

@@ -110,9 +110,8 @@ def test_a_file_that_grew_while_it_was_decoded_is_decoded_again_and_taken_once(l
     row = loop.row()
     assert row is not None
     assert (row.size, row.mtime_ns) == (len(WHOLE), 2_000)
-    assert decode(path, [loop.hand.caches]).completeness == loop.daemon._store.segments.completeness(
-        "unit_7", path.stem
-    )
+    whole = decode(path, [loop.hand.caches])
+    assert whole.completeness == loop.daemon._store.segments.completeness(whole.id)
     for _ in range(5):  # the change is heard of once more; it is no duplicate of itself
         loop.daemon._news.put(FileChanged(path, "unit_7"))
         loop.daemon._turn()
@@ -132,9 +131,8 @@ def test_a_file_replaced_again_and_again_is_taken_in_its_last_state(loop: Loop) 
     row = loop.row()
     assert row is not None
     assert (row.size, row.mtime_ns) == (len(WHOLE), 5)
-    assert decode(path, [loop.hand.caches]).completeness == loop.daemon._store.segments.completeness(
-        "unit_7", path.stem
-    )
+    whole = decode(path, [loop.hand.caches])
+    assert whole.completeness == loop.daemon._store.segments.completeness(whole.id)
 
 
 def test_a_file_that_went_while_it_was_decoded_is_taken_all_the_same(loop: Loop) -> None:
@@ -158,7 +156,7 @@ def test_a_result_of_another_segment_than_the_header_told_is_not_taken(loop: Loo
         loop.daemon._news.put(FileChanged(path, "unit_7"))
         loop.daemon._turn()
     assert loop.row() is None
-    assert loop.daemon._store.segments.completeness("unit_7", "unit_7-2024-250-1-4") is None
+    assert not loop.daemon._store.segments.is_held("unit_7", "unit_7-2024-250-1-4")
 
 
 def test_a_file_that_comes_does_not_wait_for_a_folder_full_of_bad_ones(loop: Loop) -> None:

@@ -421,8 +421,8 @@ class TestSegments:
         assert store.segments.put(s) == s.id
         back = store.segments.get(s.id)
         assert back.id == s.id and back.get("depth").v.tolist() == s.get("depth").v.tolist()
-        assert store.segments.completeness("unit", s.id.name) == s.completeness
-        assert store.segments.completeness("unit", "other") is None
+        assert store.segments.completeness(s.id) == s.completeness
+        assert store.segments.completeness(SegmentId(s.id.opened_at, "unit", "other")) is None
 
     def test_dense_data_are_kept_thinned_and_lead_to_the_same(self, store):
         """4 s data, as of a file that was recovered with the glider."""
@@ -440,7 +440,7 @@ class TestSegments:
         s = mission(LEGS)[2]
         store.segments.put(cut(s, s.id.opened_at + 3000))
         assert store.segments.put(s) == s.id
-        assert store.segments.completeness("unit", s.id.name) == s.completeness
+        assert store.segments.completeness(s.id) == s.completeness
         assert store.extent("unit") == (1, 0)
 
     def test_a_copy_opened_at_another_time_touches_both(self, store):
@@ -531,7 +531,7 @@ class TestSurfacings:
         store.hear(identity, 200.0, 900.0)
         store.hear(identity, 150.0, 950.0)
         assert store.known("electa").signs(0.0) == (Sign(100.0, 200.0, 500.0),)
-        assert store.known("electa").signs(100.1) == () and store.known("other").signs(0.0) == ()
+        assert store.known("electa").signs(500.1) == () and store.known("other").signs(0.0) == ()
 
     def test_the_first_surfacing_after_a_time(self, store):
         ended = [replace(SLOW, t_dive=t, t_surface=t + 50) for t in (0.0, 100.0)]

@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from gliderwatch.estimation.speed import NOT_FLOWN
 from gliderwatch.ingest.decode import decode
 from gliderwatch.model import Assessment, Kind, Segment, Series, readonly
 from gliderwatch.simulate.dockserver import write_mission
@@ -68,13 +68,43 @@ def commanded(segments: Sequence[Segment], off: float, since: float) -> list[Seg
 
 
 def test_a_commanded_heading_that_is_not_flown_is_no_false_alarm(tmp_path: Path) -> None:
-    """What is not measured cannot be wrong. With measured headings the same is flag 2."""
+    """What is not measured cannot be wrong: the glider went where the current leaves its way to be."""
     mission = simulate(Scenario(days=2.5))
     fixed = mission.truth[10].t_dive - 60
     found = assessed(commanded(decoded(mission, tmp_path), 0.6, fixed))
-    assert {(a.flag, a.reason) for a in found if a.t_dive < fixed} == {(0, "")}
-    assert {(a.flag, a.reason) for a in found if a.t_dive > fixed} == {(None, NOT_FLOWN)}
-    assert {a.evidence["heading_commanded"] for a in found} == {1.0}
+    assert {a.flag for a in found} == {0}
+    assert np.abs(errors(mission, found)).max() < 0.03
+
+
+def without(segments: Sequence[Segment], *names: str) -> list[Segment]:
+    """The segments without some quantities."""
+    return [
+        replace(s, quantities={n: q for n, q in s.quantities.items() if n not in names}) for s in segments
+    ]
+
+
+@pytest.mark.parametrize(
+    "missing",
+    [
+        ("heading",),
+        ("heading", "heading_commanded"),
+        ("heading", "dr_lat", "dr_lon"),
+        ("heading", "heading_commanded", "dr_lat", "dr_lon"),
+        ("heading", "speed_onboard"),
+        ("pitch", "speed_onboard"),
+        ("depth", "speed_onboard"),
+        ("roll", "thruster_on", "oil_volume", "ballast"),
+    ],
+)
+def test_each_list_of_sensors_is_judged_and_tells_of_drag(missing: tuple[str, ...], tmp_path: Path) -> None:
+    onset = Scenario().start + 2.5 * 86400
+    mission = simulate(Scenario(days=3.5, faults=(Fault(FaultKind.REMORA, onset, 4.0),)))
+    found = assessed(without(decoded(mission, tmp_path), *missing))
+    healthy = [a for a in found if a.t_surface < onset]
+    assert not {1, 2} & {a.flag for a in healthy}
+    assert np.mean([a.flag == 0 for a in healthy]) >= 0.9
+    slow = [a for a in found if a.t_dive > onset][:3]
+    assert 1 in {a.flag for a in slow}
 
 
 def test_a_slow_glider_is_told_by_commanded_headings_too(tmp_path: Path) -> None:
@@ -82,7 +112,8 @@ def test_a_slow_glider_is_told_by_commanded_headings_too(tmp_path: Path) -> None
     mission = simulate(Scenario(days=3.0, faults=(Fault(FaultKind.REMORA, onset, 4.0),)))
     found = assessed(commanded(decoded(mission, tmp_path), 0.0, onset))
     assert {a.flag for a in found if a.t_surface < onset} == {0}
-    assert {a.flag for a in found if a.t_dive > onset} == {1}
+    after = [a.flag for a in found if a.t_dive > onset]
+    assert 1 in after[:2] and 2 not in after
 
 
 def test_a_glider_that_surfaces_every_half_hour_learns_what_is_normal(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from queue import Empty, Queue
 import pytest
 
 from gliderwatch.ingest.scan import Place, expand, scan
-from gliderwatch.ingest.watch import CacheChanged, Change, FileChanged, TreeChanged, Watcher
+from gliderwatch.ingest.watch import CacheChanged, Change, FileChanged, ScienceChanged, TreeChanged, Watcher
 
 LONG = "electa-2022-308-3-2.sbd"
 SHORT = "00930002.sbd"
@@ -152,7 +152,8 @@ def test_renaming_tells_of_both_names(watch, dock):
 
 
 def test_other_files_and_folders_are_no_news(watch, dock):
-    for folder in ("electa/archive", "unknown/from-glider", "electa/from-glider/archive", "electa/to-glider"):
+    left_out = ("electa/archive", "unknown/from-glider", "electa/from-glider/archive", "electa/to-glider")
+    for folder in (*left_out, "electa/from-glider/.~tmp~"):
         (dock.root / folder).mkdir(parents=True, exist_ok=True)
     _, queue = watch()
     drain(queue)
@@ -160,6 +161,9 @@ def test_other_files_and_folders_are_no_news(watch, dock):
         dock.inbox / "00930002.tbd",
         dock.inbox / "notes.txt",
         dock.inbox / f".{LONG}.x81f",
+        dock.inbox / f".{LONG}",
+        dock.inbox / f"{LONG}.filepart",
+        dock.inbox / ".~tmp~" / LONG,
         dock.inbox / "archive" / LONG,
         dock.inbox.parent / LONG,
         dock.inbox.parent / "logs" / LONG,
@@ -170,7 +174,15 @@ def test_other_files_and_folders_are_no_news(watch, dock):
         dock.cache / "notes.txt",
     ):
         path.write_bytes(b"data")
-    assert [change for change in drain(queue) if not isinstance(change, TreeChanged)] == []
+    news = [change for change in drain(queue) if not isinstance(change, TreeChanged)]
+    assert set(news) <= {ScienceChanged(dock.inbox / "00930002.tbd")}
+
+
+def test_a_science_file_is_news_for_the_flight_file_beside_it(watch, dock):
+    _, queue = watch()
+    drain(queue)
+    dock.move_in(dock.inbox / "00930002.TCD")
+    assert ScienceChanged(dock.inbox / "00930002.TCD") in drain(queue)
 
 
 def test_a_glider_that_appears_is_watched_at_once(watch, dock):
@@ -363,6 +375,9 @@ def test_scanning_finds_the_flight_data_of_all_layouts(dock):
         ("group/gliders/nemo/from-glider", "g.dbd"),
         ("unknown/from-glider", "h.sbd"),
         ("Unknown/from-glider", "i.sbd"),
+        ("electa/from-glider", ".k.sbd"),
+        ("electa/from-glider/.~tmp~", "l.sbd"),
+        (".snapshot/electa/from-glider", "m.sbd"),
         ("stations/default/gliders/ru30/from-glider", "j.mcd"),
     ):
         (dock.root / folder).mkdir(parents=True, exist_ok=True)

@@ -110,10 +110,11 @@ def test_no_direction_is_special(all_dives, angle):
     for a, b in zip(plain, others, strict=True):
         assert a.flag == b.flag
         assert a.info.cause == b.info.cause
-        assert math.isclose(a.info.estimate.speed, b.info.estimate.speed, abs_tol=1e-6)
-        assert math.isclose(a.info.estimate.sigma, b.info.estimate.sigma, abs_tol=1e-6)
+        # the way leads to other latitudes, where inertial motion has another period
+        assert math.isclose(a.info.estimate.speed, b.info.estimate.speed, abs_tol=2e-3)
+        assert math.isclose(a.info.estimate.sigma, b.info.estimate.sigma, abs_tol=2e-3)
         expected = np.array([[c, -s], [s, c]]) @ a.info.estimate.flow
-        assert np.allclose(b.info.estimate.flow, expected, atol=1e-6)
+        assert np.allclose(b.info.estimate.flow, expected, atol=2e-3)
 
 
 @settings(max_examples=40)

@@ -6,7 +6,8 @@ import pytest
 
 from announcing import HOUR, STEP, Talk, World, dive
 from gliderwatch.model import Expected, Severity, Unusable
-from gliderwatch.rules.announce import NEWS, Said
+from gliderwatch.rules.announce import Said
+from gliderwatch.rules.constants import NEWS
 
 
 def test_nothing_known_nothing_said():
@@ -53,7 +54,7 @@ class TestReminders:
         talk = Talk(reminder_hours=24.0)
         kinds = {n: talk.hear("0" + "1" * n) for n in range(2, 40)}
         reminded = [n for n, said in kinds.items() if said == ["reminder"]]
-        assert kinds[2] == ["anomaly"] and reminded == [10, 18, 26, 34]  # every eighth dive of 3 h
+        assert kinds[2] == ["anomaly"] and reminded == [10, 18, 34]  # after 1, 2 and 4 days of 8 dives
 
     def test_none_when_switched_off(self):
         talk = Talk(reminder_hours=None)
@@ -69,14 +70,16 @@ class TestReminders:
         talk = Talk(reminder_hours=24.0)
         assert talk.hear("011" + "-" * 16) == ["anomaly"]
         assert talk.hear("011" + "-" * 16) == []
-        assert talk.hear("011" + "-" * 24) == ["reminder"]
+        assert talk.hear("011" + "-" * 31) == []
+        assert talk.hear("011" + "-" * 32) == ["reminder"]
 
     def test_a_correction_is_as_good_as_a_reminder(self):
         talk = Talk(reminder_hours=24.0)
         talk.hear("011" + "1" * 6)
         assert talk.hear("001" + "1" * 7) == ["correction"]
         assert talk.hear("001" + "1" * 13) == []
-        assert talk.hear("001" + "1" * 15) == ["reminder"]
+        assert talk.hear("001" + "1" * 16) == []
+        assert talk.hear("001" + "1" * 18) == ["reminder"]
 
 
 class TestCorrections:

@@ -124,11 +124,11 @@ def test_a_file_that_could_not_be_decoded_for_now_is_tried_again(
 def test_a_cache_folder_that_cannot_be_read_is_left_to_the_decoder_to_tell(
     path: Path, store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def closed(crc: str, folders: object) -> Path:
-        raise PermissionError(13, "Permission denied")
+    def closed(folder: Path) -> list[str]:
+        raise PermissionError(13, "Permission denied", str(folder))
 
-    monkeypatch.setattr(arrivals, "find_cache", closed)
-    assert isinstance(judge(path, store), Job)
+    monkeypatch.setattr(os, "listdir", closed)
+    assert isinstance(judge(path, store, path.parent), Job)
 
 
 def test_a_name_that_is_not_text_is_quarantined_and_can_be_kept(
@@ -172,7 +172,7 @@ def test_a_waiting_file_that_was_renamed_and_taken_then_is_done_with(
 ) -> None:
     noted(path, store)
     another = path.rename(path.with_name("another.sbd"))
-    monkeypatch.setattr(Segments, "completeness", lambda self, glider, name: (0, 1, ""))
+    monkeypatch.setattr(Segments, "is_held", lambda self, glider, name: True)
     assert noted(path, store).status == Status.DUPLICATE
     assert judge(path, store) is None
     another.rename(path)  # it had only been away: what is known of its segment may be less than it holds

@@ -59,7 +59,7 @@ def test_minimal_file_has_the_documented_defaults(write: Write) -> None:
     dockserver = config.dockserver
     assert dockserver.roots == ("/data",)
     assert (dockserver.settle_seconds, dockserver.rescan_seconds, dockserver.observer) == (60, 300, "inotify")
-    assert config.defaults_params() == GliderParams()
+    assert config.glider("never-heard-of") == GliderParams()
     assert (config.gliders, config.channels, config.recipients) == ({}, {}, {})
 
 
@@ -161,7 +161,7 @@ def test_precedence(write: Write, presets: Write) -> None:
     presets(TWO_PRESETS)
     config = load(write(LAYERED))
     plain, own, other = (config.glider(name) for name in ("plain", "own", "other"))
-    assert plain == config.defaults_params() == config.glider("never-heard-of")
+    assert plain == config.glider("never-heard-of")
 
     # built-in < preset < defaults
     assert (plain.speed_min, plain.speed_max) == (0.1, 0.2)
@@ -199,7 +199,7 @@ def test_every_parameter_has_its_key() -> None:
 
 def test_no_presets(write: Write, presets: Write) -> None:
     presets("# none yet\n")
-    assert load(write(MINIMAL)).defaults_params() == GliderParams()
+    assert load(write(MINIMAL)).glider("never-heard-of") == GliderParams()
     assert problems(write(MINIMAL + "defaults: {preset: x}\n")) == [
         "c.yml:2: defaults.preset: there is no preset `x` (remove it)"
     ]
@@ -216,7 +216,10 @@ def test_every_shipped_preset_loads(write: Write) -> None:
     assert presets_path() == EXAMPLE.with_name("presets.yml")
     config = load(write(MINIMAL + "defaults: {preset: franklin}\n"))
     assert set(config._presets) == {"franklin", "usf-sam", "usf-gansett", "usf-stella"}
-    assert (config.defaults_params().speed_min, config.defaults_params().speed_max) == (0.15, 0.25)
+    assert (config.glider("never-heard-of").speed_min, config.glider("never-heard-of").speed_max) == (
+        0.15,
+        0.25,
+    )
 
 
 def test_locate_gives_the_line_of_a_key_or_of_what_it_belongs_to(write: Write) -> None:

@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from gliderwatch.config import Problem, check, load
+from gliderwatch.config import Problem, load
+from gliderwatch.run.doctor import examine
+from gliderwatch.run.preconditions import check
 
 TEXT = """\
 dockserver:
@@ -105,9 +107,35 @@ def test_folders_that_cannot_be_read(found: Check, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(os, "access", access)
     glider, cache = found()
     assert glider.startswith(
-        "error c.yml:8: gliders.electa: gliders/Electa/from-glider cannot be read (chmod"
+        "error c.yml:8: gliders.electa: gliders/Electa/from-glider cannot be read (let this"
     )
-    assert cache.startswith("error c.yml:5: dockserver.cache.0: cache cannot be read (chmod")
+    assert cache.startswith("error c.yml:5: dockserver.cache.0: cache cannot be read (let this")
+
+
+@pytest.mark.parametrize("link", ["gliders/george", "gliders/george/from-glider", "gliders/group/George"])
+def test_a_glider_whose_folder_is_a_link_is_named_with_the_cure(found: Check, tree: Path, link: str) -> None:
+    target = tree / "disk2" / "george" / "from-glider"
+    target.mkdir(parents=True)
+    (tree / link).parent.mkdir(exist_ok=True)
+    (tree / link).symlink_to(target if link.endswith("from-glider") else target.parent)
+    text = TEXT.replace("  electa:\n", "  electa:\n  george:\n")
+    assert found(text) == [
+        f"error c.yml:9: gliders.george: {link} is a symbolic link, and links are not followed: its files "
+        "are not seen (write `paths: [disk2/george/from-glider]` below the glider)"
+    ]
+    path = tree / "c.yml"
+    path.write_text(text, encoding="utf-8")
+    folders = [f for f in examine(path) if f.topic == "folders"]
+    assert [f.level.name for f in folders] == ["ERROR"]
+    assert folders[0].cure == f"write `paths: [{target}]` below the glider"
+    cured = text.replace("  george:\n", f"  george: {{paths: ['{target}']}}\n")
+    assert found(cured) == []
+
+
+def test_a_link_that_leads_nowhere_or_is_not_in_the_way_is_nothing(found: Check, tree: Path) -> None:
+    (tree / "gliders" / "sam").symlink_to(tree / "nowhere")
+    (tree / "gliders" / "alias").symlink_to(tree / "gliders" / "Electa")
+    assert found() == []
 
 
 def test_configured_glider_without_folder_is_a_warning(found: Check) -> None:
@@ -153,8 +181,9 @@ def test_state(found: Check, tree: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert is_one(found(TEXT.replace("state/s.sqlite", "state")), where + "state is a folder")
     assert is_one(found(TEXT.replace("state/s.sqlite", "gliders/s")), where + "lies below the root gliders")
 
-    monkeypatch.setattr("shutil.disk_usage", lambda _: Usage(1e9, 0.9e9, 0.1e9))
-    assert is_one(found(), "warning c.yml:6: state.path: less than 200 MB are free in")
+    with monkeypatch.context() as full:
+        full.setattr("shutil.disk_usage", lambda _: Usage(1e9, 0.9e9, 0.1e9))
+        assert is_one(found(), "warning c.yml:6: state.path: less than 200 MB are free in")
 
     real = os.access
     monkeypatch.setattr(os, "access", lambda path, mode: not mode & os.W_OK and real(path, mode))

@@ -58,7 +58,7 @@ def problems(path: Path) -> list[str]:
         (
             MINIMAL + "defaults: {zzzz: 1}",
             "2: defaults.zzzz: unknown key (known are: adaptive, detection, estimator, normal_speed, "
-            "overdue_hours, preset, reference, rules, surfacing_hours)",
+            "overdue_hours, preset, reference, rules, surfacing_hours, unknown_dives, unknown_hours)",
         ),
         (MINIMAL + "defaults: {paths: [/d]}", "2: defaults.paths: unknown key (known are: adaptive"),
         (MINIMAL + "stat: {}", "2: stat: unknown key (did you mean `state`?)"),
@@ -159,6 +159,14 @@ def problems(path: Path) -> list[str]:
         (
             MINIMAL + "gliders:\n  my glider:",
             "3: gliders.my glider: must be a name of letters, digits, `-` and `_`",
+        ),
+        (
+            MINIMAL + "gliders:\n  '#2!':",
+            '3: gliders."#2!": must be a name of letters, digits, `-` and `_`',
+        ),
+        (
+            MINIMAL + "channels:\n  $mail: {url: json://x}",
+            '3: channels."$mail": must be a name of letters, digits, `-` and `_`',
         ),
         (
             MINIMAL + "gliders:\n  Electa:\n  electa:",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import traceback
 from collections.abc import Callable
 from pathlib import Path
@@ -77,6 +78,10 @@ def test_only_login_and_query_values_are_encoded(
         ("${file:/no/such}", "file /no/such cannot be read: No such file or directory"),
         ("${file:two}", "file two must hold one line of text"),
         ("${file:binary}", "file binary cannot be read: not UTF-8 text"),
+        ("${file:/dev/zero}", "file /dev/zero is no regular file: put the secret into one"),
+        ("${file:fifo}", "file fifo is no regular file: put the secret into one"),
+        ("${file:huge}", "file huge is larger than 64 kB: it must hold one line of text"),
+        ("${file:.}", "file . cannot be read: Is a directory"),
         ("${credential:x}", "credential x is not there: systemd did not set CREDENTIALS_DIRECTORY"),
     ],
 )
@@ -86,6 +91,8 @@ def test_a_reference_that_cannot_be_had_names_channel_and_line(
     monkeypatch.setenv("EMPTY_HERE", " ")
     monkeypatch.delenv("CREDENTIALS_DIRECTORY", raising=False)
     (tmp_path / "two").write_text(f"{SECRET}\n{SECRET}\n")
+    (tmp_path / "huge").write_text(SECRET * 100_000)
+    os.mkfifo(tmp_path / "fifo")
     (tmp_path / "binary").write_bytes(SECRET.encode() + b"\xff")
     path = write(MINIMAL + f"channels:\n  mail:\n    url: json://u:{SECRET}@h/{reference}\n")
     with pytest.raises(ConfigError) as caught:
@@ -133,6 +140,8 @@ URL = f"mailtos://user:{SECRET}@smtp.example.{SECRET}"
         f"recipients: {{p: {{channels: '{URL}'}}}}",
         f"gliders: {{a: {{preset: '{URL}'}}}}",
         f"dockserver: {{observer: '{URL}'}}",
+        f"gliders: {{'{URL}': }}",
+        f"gliders: {{'T0A1B2C3D/B0A1B2C3D/{SECRET}{SECRET}': }}",
         f"'{URL}': x",
         URL,
     ],

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from gliderwatch.model import Current
-from gliderwatch.navigation.current import EARLY, Report, new_reports, pair, updated
+from gliderwatch.navigation.constants import CURRENT_EARLY
+from gliderwatch.navigation.current import Report, new_reports, pair, updated
 from missions import segment
 
 NONE = (None, None)
@@ -67,7 +68,7 @@ def test_the_current_belongs_to_the_dive_that_surfaced_last():
 
 
 def test_it_may_come_a_little_before_the_last_sample_under_water():
-    assert pair(at(500.0 - EARLY, 500.0 - EARLY - 1), [500.0]) == [0, -1]
+    assert pair(at(500.0 - CURRENT_EARLY, 500.0 - CURRENT_EARLY - 1), [500.0]) == [0, -1]
 
 
 def test_no_dive_no_current():

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from gliderwatch.model import Dive, Segment, Series, Unusable
-from gliderwatch.navigation.dives import LONGEST, Navigation, extend
+from gliderwatch.navigation.constants import LONGEST_DIVE
+from gliderwatch.navigation.dives import Navigation, extend
 from gliderwatch.navigation.samples import concatenated
 from gliderwatch.navigation.track import closure
 from missions import LAT, LON, START, Leg, cut, mission, opened, segment, series
@@ -126,8 +127,8 @@ class TestUnusable:
 
     def test_no_heading(self):
         _, (dive,) = told([with_samples(mission(LEGS)[0], heading=None)])
-        assert dive.reason == "no heading for 2.0 h" and dive.n_samples == 0
-        assert dive.unusable is Unusable.NO_HEADING
+        assert dive.reason == "" and dive.n_samples == 0  # depth and pitch tell how fast it was
+        assert dive.features.heading_assumed
 
     def test_turning_with_few_headings(self):
         s = with_samples(
@@ -135,8 +136,8 @@ class TestUnusable:
             heading=[(START + 200, 0.0), (START + 8000, 1.5), (START + 21000, 3.0)],
         )
         _, (dive,) = told([s])
-        assert dive.reason.startswith("turning, and no heading for 3.6 h")
-        assert dive.unusable is Unusable.TURNING
+        assert dive.features.heading_assumed
+        assert any(note.startswith("headings missing") for note in dive.notes)
 
     def test_shorter_than_a_quarter_of_an_hour(self):
         _, dives = told(mission([Leg(hours=0.2), Leg(hours=0.24), Leg(hours=0.3)]))
@@ -150,7 +151,7 @@ class TestUnusable:
         assert dive.unusable is Unusable.WILD_FIX
 
     def test_days_without_a_fix_are_no_dive(self):
-        legs = [Leg(hours=LONGEST / 3600 + 1)]
+        legs = [Leg(hours=LONGEST_DIVE / 3600 + 1)]
         _, dives = told(mission(legs))
         assert dives == []
 
@@ -161,10 +162,14 @@ class TestUnusable:
         identity = replace(last.id, opened_at=last.id.opened_at + 18000.0)
         last = replace(last, id=identity, last_t=last.last_t + 18000.0, quantities=later)
         here, there = START + 400.0, identity.opened_at + 30.0
+        skipped = replace(last, id=replace(identity, name=identity.name[:-1] + "7"))
         for north, n in ((0.02, 0), (2.0, 1)):
-            moved = fixes(last, (there, north), (there + 30.0, north + 0.002))
+            moved = fixes(skipped, (there, north), (there + 30.0, north + 0.002))
             _, dives = told([fixes(first, (START + 30.0, 0.0), (here, 0.003)), moved])
             assert [d.reason[:12] for d in dives] == ["data missing"] * n
+        # nor between a segment that ended at the surface and the next one of its mission: that is a call
+        adrift = fixes(last, (there, 2.0), (there + 30.0, 2.002))
+        assert told([fixes(first, (START + 30.0, 0.0), (here, 0.003)), adrift])[1] == []
 
     def test_mostly_at_the_surface(self):
         s = mission(LEGS)[0]
@@ -295,6 +300,26 @@ class TestCurrent:
         }
         _, dives = told([first, with_samples(second, **stale, current_final_x=None, current_final_y=None)])
         assert dives[1].current is None
+
+    def test_a_surfacing_without_a_fix_closes_nothing_and_takes_no_current(self):
+        """Three dives; the fixes after the second and before the third are in no file. What was published
+        between them is neither the first dive's, nor that of all the way to the next fix."""
+        made = mission([*LEGS[:1], Leg(hours=3), Leg(hours=3)])
+        t = opened([*LEGS[:1], Leg(hours=3)], 2)  # when the third segment opens
+        ends = t - 1200.0, t + 3600.0
+        second, third = (
+            {k: (v.between(*span) if k in {"fix_lat", "fix_lon"} else v) for k, v in each.quantities.items()}
+            for each, span in ((made[1], (0.0, ends[0])), (made[2], (ends[1], np.inf)))
+        )
+        _, dives = told([made[0]])
+        kept = current_of(dives[0])
+        _, dives = told([made[0], replace(made[1], quantities=second), replace(made[2], quantities=third)])
+        assert len(dives) == 2
+        first, long = dives
+        # corrected at the start of the second segment, and not by what came four hours later
+        assert current_of(first) == pytest.approx((0.1, -0.05)) and kept == pytest.approx((0.12, -0.07))
+        assert long.features.surfacing_unseen and long.current is None
+        assert any("surfaced without a fix" in note for note in long.notes)
 
     def test_a_value_from_before_the_first_dive_gives_none(self):
         s = mission(LEGS[:1])[0]

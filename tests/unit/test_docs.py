@@ -152,7 +152,8 @@ def test_queries_fit_the_schema() -> None:
 def test_tables_are_all_described() -> None:
     tables = re.findall(r"CREATE TABLE (\w+)", "\n".join([schema(), *MIGRATIONS.values()]))
     described = re.findall(r"^\| `(\w+)` \|", text("docs/state-file.md"), re.M)
-    assert sorted(tables) == sorted(described)
+    made = {re.sub(r"_\d+$", "", table) for table in tables}  # a table that changes is made anew, and renamed
+    assert sorted(made) == sorted(described)
 
 
 def test_python_shown_reads_a_state_file(tmp_path: Path) -> None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import stat
 import subprocess
 import time
 from collections import namedtuple
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ import pytest
 
 import dinkum
 from alert_support import alert
-from gliderwatch.config import check, load
+from gliderwatch.config import load
 from gliderwatch.ingest.scan import find_places, scan
 from gliderwatch.ingest.segment import SENSORS
 from gliderwatch.run import doctor
@@ -32,6 +33,7 @@ from gliderwatch.run.doctor.finding import (
     warning,
 )
 from gliderwatch.run.life import Life, alive_path
+from gliderwatch.run.preconditions import check
 from gliderwatch.store import outbox
 from gliderwatch.store.sqlite import Store
 
@@ -62,7 +64,7 @@ def put(
 ) -> Path:
     """A file of electa, and its cache file; without some sensors."""
     sensors = tuple(s for s in SENSORS_OF_ALL if s[0] not in lacking)
-    (tree / "cache" / f"{crc}.cac").write_bytes(dinkum.sensor_list(sensors))
+    (tree / "cache" / f"{crc}.cac").write_bytes(dinkum.sensor_list(sensors, crc))
     path = tree / "gliders" / "electa" / "from-glider" / f"{name}.sbd"
     path.write_bytes(dinkum.header(name, crc=crc, n_held=len(sensors), **tags))
     return path
@@ -170,20 +172,86 @@ def test_an_old_python(examined: Doctor, monkeypatch: pytest.MonkeyPatch) -> Non
     assert one(examined(), Level.ERROR, "program", "gliderwatch ")
 
 
-def test_a_group_that_is_missing(examined: Doctor, tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    real, cache = os.access, tree / "cache"
-    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != cache and real(path, mode))
+@pytest.fixture
+def closed(examined: Doctor, tree: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Finding]]:
+    """What is found where a user, of no group of the cache folder's, is shut out of it."""
+    real_access, real_stat, cache = os.access, Path.stat, tree / "cache"
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != cache and real_access(path, mode))
+    monkeypatch.setattr(os, "geteuid", lambda: 4_000_001)
     monkeypatch.setattr(os, "getegid", lambda: 4_000_001)
-    monkeypatch.setattr(os, "getgroups", list)
-    monkeypatch.setattr(os, "getgrouplist", lambda name, gid: [gid])
-    found = [f for f in examined() if f.topic == "user"]
-    assert one(found, Level.ERROR, "user", "is not in group", "cache")
-    assert "SupplementaryGroups=" in found[0].cure
 
-    monkeypatch.setattr(os, "getgrouplist", lambda name, gid: [gid, cache.stat().st_gid])
-    assert one([f for f in examined() if f.topic == "user"], Level.ERROR, "user", "but not yet here")
-    monkeypatch.setattr(os, "getgroups", lambda: [cache.stat().st_gid])
-    assert one([f for f in examined() if f.topic == "user"], Level.ERROR, "user", "closed to its group")
+    def _closed(
+        *, uid: int = 0, gid: int = 4_000_002, mode: int = 0o750, mine: Sequence[int] = (), late: bool = False
+    ) -> list[Finding]:
+        def stat_(self: Path, **how: Any) -> os.stat_result:
+            true = list(real_stat(self, **how))
+            if self == cache:
+                true[0], true[4], true[5] = stat.S_IFDIR | mode, uid, gid
+            return os.stat_result(true) if self == cache else real_stat(self, **how)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "getgroups", lambda: list(mine))
+            patch.setattr(os, "getgrouplist", lambda name, own: [own, gid] if late else [own])
+            patch.setattr(Path, "stat", stat_)
+            return [f for f in examined() if f.topic == "user"]
+
+    return _closed
+
+
+def test_a_group_that_is_missing(closed: Callable[..., list[Finding]]) -> None:
+    found = closed()
+    assert one(found, Level.ERROR, "user", "4000001 is not in group 4000002", "cache")
+    assert "SupplementaryGroups=4000002" in found[0].cure
+    assert one(closed(late=True), Level.ERROR, "user", "but not yet here")
+
+
+def test_a_folder_that_is_closed_to_its_owner_or_its_group(closed: Callable[..., list[Finding]]) -> None:
+    found = closed(mode=0o700, mine=[4_000_002])
+    assert one(found, Level.ERROR, "user", "closed to its group")
+    assert found[0].cure.startswith("chmod g+rx ")
+    found = closed(mode=0o070, uid=4_000_001)
+    assert found[0].cure.startswith("chmod u+rx ")
+
+
+@pytest.mark.parametrize(
+    ("gid", "mode", "group"),
+    [(0, 0o700, "root"), (0, 0o750, "root"), (4_000_002, 0o700, "4000002"), (4_000_002, 0o750, "docker")],
+)
+def test_the_cure_of_a_closed_folder_is_never_a_privilege(
+    closed: Callable[..., list[Finding]], monkeypatch: pytest.MonkeyPatch, gid: int, mode: int, group: str
+) -> None:
+    monkeypatch.setattr(machine, "_group", lambda gid: group)
+    (finding,) = closed(gid=gid, mode=mode)
+    assert f"(root:{group}, mode {mode:04o}) is closed to 4000001" in finding.text
+    assert finding.cure.startswith("setfacl -R -m u:4000001:rX ")
+    assert "usermod" not in finding.cure
+    assert "SupplementaryGroups" not in finding.cure
+
+
+def test_a_folder_that_went_is_no_raw_exception(
+    examined: Doctor, tree: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tree / "dangling").symlink_to(tree / "nowhere")
+    monkeypatch.setattr(os, "geteuid", lambda: 4_000_001)
+    found = examined(TEXT.replace("[cache]", f"[cache, {tree}/dangling]"))
+    assert not [f for f in found if "Error" in f.text]
+    assert any("dangling cannot be looked at: No such file" in f.text for f in found if f.topic == "user")
+
+
+def test_a_cache_that_is_closed_is_no_raw_exception(
+    closed: Callable[..., list[Finding]], examined: Doctor, tree: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = os.listdir
+
+    def shut(folder: Path) -> list[str]:
+        if Path(folder) == tree / "cache":
+            raise PermissionError(13, "Permission denied", str(folder))
+        return real(folder)
+
+    monkeypatch.setattr(os, "listdir", shut)
+    found = examined(all_=True)
+    assert not [f for f in found if "could not be looked at" in f.text]
+    assert any("cache cannot be read: Permission denied" in f.text for f in found if f.topic == "caches")
 
 
 def test_root_is_told_that_it_sees_too_much(examined: Doctor, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -258,7 +326,7 @@ def test_files_that_are_no_use_are_named(examined: Doctor, tree: Path) -> None:
         (("m_gps_lon",), Level.ERROR, ("m_gps_lon", "nothing can be assessed")),
         (("m_water_vx", "m_water_vy"), Level.WARNING, ("m_water_vx or m_initial_water_vx", "flag 2")),
         (("m_water_vy",), Level.WARNING, ("m_water_vy or m_initial_water_vy (no current", "flag 2")),
-        (("m_depth",), Level.WARNING, ("m_depth (drift is told from flight by pitch alone",)),
+        (("m_depth",), Level.WARNING, ("m_depth or m_pressure (drift is told",)),
         (("m_pitch",), Level.WARNING, ("m_pitch (no asymmetry",)),
         (("m_roll",), Level.WARNING, ("m_roll (no sign of a lost wing",)),
         (("m_lon",), Level.NOTE, ("m_lon (the way of a dive",)),
@@ -388,7 +456,7 @@ def test_a_state_file_that_is_damaged(examined: Doctor, tree: Path) -> None:
 
 def test_a_state_file_that_is_none(examined: Doctor, tree: Path) -> None:
     (tree / "state" / "s.sqlite").write_bytes(b"not a database" * 1000)
-    assert one([f for f in examined() if f.topic == "state"], Level.ERROR, "state", "not a database")
+    assert one([f for f in examined() if f.topic == "state"], Level.ERROR, "state", "a text file")
 
 
 def test_a_state_file_of_a_newer_gliderwatch(examined: Doctor, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -519,4 +587,7 @@ def test_an_archive_is_no_glider(tree: Path, name: str) -> None:
 def test_a_link_is_not_followed_by_check_either(tree: Path) -> None:
     (tree / "gliders" / "electa").rename(tree / "elsewhere")
     (tree / "gliders" / "electa").symlink_to(tree / "elsewhere")
-    assert texts(tree) == ["gliders.electa: no folder electa/from-glider below the roots"]
+    link = tree / "gliders" / "electa"
+    assert texts(tree) == [
+        f"gliders.electa: {link} is a symbolic link, and links are not followed: its files are not seen"
+    ]

@@ -3,7 +3,8 @@
 import pytest
 
 from gliderwatch.model import Fix
-from gliderwatch.navigation.fixes import SURFACE_SPELL, distance, new_fixes
+from gliderwatch.navigation.constants import SURFACE_STAY
+from gliderwatch.navigation.fixes import distance, new_fixes
 from missions import LAT, LON, series
 
 KM = 1 / 111.195
@@ -61,7 +62,7 @@ def test_fast_drift_is_not_wild():
 
 
 def test_fixes_before_and_after_a_dive_cannot_contradict_each_other():
-    assert len(found((10.0, 0.01), (SURFACE_SPELL + 11, 5.0))) == 2
+    assert len(found((10.0, 0.01), (SURFACE_STAY + 11, 5.0))) == 2
 
 
 def test_a_single_fix_where_the_dive_began_is_suspect():

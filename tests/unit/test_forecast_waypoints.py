@@ -1,6 +1,7 @@
 import numpy as np
 
-from gliderwatch.forecast.waypoints import KEPT, bound_for, heard
+from gliderwatch.forecast.constants import WAYPOINTS_HEARD
+from gliderwatch.forecast.waypoints import bound_for, heard
 from gliderwatch.model import Segment, SegmentId, Series, readonly
 
 
@@ -31,10 +32,10 @@ def test_any_order_of_segments_tells_the_same():
 
 def test_repeated_reports_are_left_out_and_old_ones_forgotten():
     known = ()
-    for k in range(3 * KEPT):
+    for k in range(3 * WAYPOINTS_HEARD):
         known = heard(known, segment((float(k), 27.0 + k // 2, -84.0)))
-    assert len(known) == KEPT
-    assert len({report[1:] for report in known}) == KEPT
+    assert len(known) == WAYPOINTS_HEARD
+    assert len({report[1:] for report in known}) == WAYPOINTS_HEARD
 
 
 def test_a_latitude_without_its_longitude_is_not_a_waypoint():

@@ -80,8 +80,8 @@ def test_thresholds_are_parameters():
     assert summary("1110", rules) == [("anomaly", 0, 2, 3, 3)]
     assert summary("S", rules) == [] and summary("1S", rules) == [("anomaly", 0, 1, None, 2)]
     assert summary("20000", rules) == [("false_alarm", 0, 0, 3, 1)]
-    _, incidents = history("1112", rules)
-    assert [(i.kind, i.severity) for i in incidents.values()] == [
+    _, incidents = history("2000111", rules)
+    assert sorted((i.kind, i.severity) for i in incidents.values()) == [
         (Kind.ANOMALY, Severity.WARNING),
         (Kind.FALSE_ALARM, Severity.INFO),
     ]
@@ -132,11 +132,27 @@ def test_the_table_knows_every_event_that_can_happen():
     }
 
 
-def oracle(letters: str, wanted: str, silent: str, open_after: int, severe_after: int, clear_after: int):
-    """The rule in plain words over the dives that say something: (first, opening, clearing dive)."""
+def oracle(
+    letters: str,
+    wanted: str,
+    silent: str,
+    open_after: int,
+    severe_after: int,
+    clear_after: int,
+    during: frozenset[int] = frozenset(),
+):
+    """The rule in plain words over the dives that say something: (first, opening, clearing dive).
+
+    On dives ``during`` something else explains what is wanted: what was open is over.
+    """
     out, row, normal, is_open = [], [], 0, False
     for k, letter in enumerate(letters):
         if letter in silent:
+            continue
+        if k in during:
+            if is_open:
+                out[-1][2] = k
+            row, normal, is_open = [], 0, False
             continue
         if letter in wanted:
             normal = 0
@@ -163,7 +179,31 @@ def test_any_history_against_the_rule_in_plain_words(letters, open_a, severe, cl
         false_alarm=FalseAlarmRule(open_after=open_f, clear_after=clear_a),
     )
     found = summary(letters, rules)
-    assert [x[1:4] for x in found if x[0] == "anomaly"] == oracle(
-        letters, "1SF", "2-", open_a, severe, clear_a
-    )
-    assert [x[1:4] for x in found if x[0] == "false_alarm"] == oracle(letters, "2", "-", open_f, 99, clear_a)
+    anomalies = oracle(letters, "1SF", "2-", open_a, severe, clear_a)
+    assert [x[1:4] for x in found if x[0] == "anomaly"] == anomalies
+    open_on = {k for _, a, b in anomalies for k in range(a, len(letters) if b is None else b)}
+    others = oracle(letters, "2", "-", open_f, 99, clear_a, frozenset(open_on))
+    assert [x[1:4] for x in found if x[0] == "false_alarm"] == others
+
+
+def near_the_bound(k, speed):
+    """A dive whose speed is normal, where the usual one is known."""
+    known = {"usual_speed": 0.23}
+    return dive(k, "0", speed=speed, speed_min=0.18, speed_max=0.3, evidence=known)
+
+
+def test_an_anomaly_is_not_over_just_inside_the_bound():
+    slow = [replace(near_the_bound(k, 0.1), flag=1) for k in (1, 2)]
+    state = Watches()
+    for each in (*slow, *(near_the_bound(k, 0.181) for k in (3, 4, 5))):
+        state, _ = judge(state, each, RuleParams())
+    assert state.anomaly.incident is not None
+    for k in (6, 7):
+        state, _ = judge(state, near_the_bound(k, 0.22), RuleParams())
+    assert state.anomaly.incident is None
+
+
+def test_a_speed_that_is_hardly_known_is_not_severe():
+    slow = replace(near_the_bound(1, 0.05), flag=1)
+    assert is_severe(replace(slow, evidence={"speed_sigma": 0.02}))
+    assert not is_severe(replace(slow, evidence={"speed_sigma": 0.1}))

@@ -48,7 +48,9 @@ def config(tmp_path: Path) -> Config:
     over = incident(id="electa/anomaly/1", opened_at=1.0, cleared_at=2.0)
     for i in (over, incident()):
         put_incident(store, i)
-    store._db.execute("INSERT INTO segments VALUES ('electa', 0, 'electa-1', '[0, 0, \"\"]', x'00', NULL, 0)")
+    store._db.execute(
+        "INSERT INTO segments VALUES ('electa', 0, 'electa-1', '[0, 0, \"\"]', 0, 0, 0, 0, x'00', NULL)"
+    )
     store.close()
     return load(path)
 
@@ -63,7 +65,7 @@ def put_incident(store: Store, i: object) -> None:
 class TestAcknowledged:
     def test_reminders_stop_and_the_all_clear_comes(self) -> None:
         said = {taken_on: self._kinds("0" + "1" * 30, "0" + "1" * 30 + "00", taken_on) for taken_on in (0, 1)}
-        assert said[0] == ["anomaly", "reminder", "reminder", "reminder", "all_clear"]
+        assert said[0] == ["anomaly", "reminder", "reminder", "all_clear"]  # after 1 and 2 days
         assert said[1] == ["anomaly", "all_clear"]
 
     def test_they_come_again_when_it_grows_worse(self) -> None:

@@ -48,7 +48,7 @@ def section(body: str, heading: str) -> list[str]:
     return [line.removeprefix("- ") for line in block.strip().split("\n")[1:]]
 
 
-MAP = "https://www.openstreetmap.org/?mlat=24.20575&mlon=-83.02057#map=9/24.20575/-83.02057"
+MAP = "https://www.openstreetmap.org/?mlat=24.20575&mlon=-83.02057&zoom=9"
 FACTS = [
     "electa",
     "2022-11-05 09:12 UTC (2 dives)",

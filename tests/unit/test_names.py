@@ -17,6 +17,15 @@ from gliderwatch.ingest import names
         ("x.sbd.part", None),
         ("sbd", None),
         (".sbd", None),
+        (".usf-sam-2019-251-4-12.sbd", None),
+        ("~x.sbd", None),
+        ("x.sbd~", None),
+        ("x.sbd.filepart", None),
+        ("x.filepart.sbd", None),
+        ("x.tmp.SBD", None),
+        ("x.Part.scd", None),
+        ("tmp-2019-251-4-12.sbd", "sbd"),
+        ("template.sbd", "sbd"),
         ("x.mlg", None),
         ("", None),
     ],
@@ -29,6 +38,11 @@ def test_kind_of_flight_data_in_either_case(name, kind):
 def test_cache_names(name):
     assert names.is_cache(name)
     assert not names.is_cache(name + "x")
+
+
+@pytest.mark.parametrize("name", [".8bc72b32.cac", "8bc72b32.tmp.cac", "8bc72b32.cac~"])
+def test_a_cache_file_under_way_is_none(name):
+    assert not names.is_cache(name)
 
 
 def test_fuller_kinds_rank_higher():

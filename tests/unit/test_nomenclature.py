@@ -12,7 +12,7 @@ import pytest
 
 from gliderwatch.estimation import baseline
 from gliderwatch.estimation.adaptive import AdaptiveParams
-from gliderwatch.estimation.causes import Surprise, Surprises
+from gliderwatch.estimation.causes import MODES, Mode
 from gliderwatch.estimation.flow import FlowParams, Tide
 from gliderwatch.estimation.joint import JointParams
 from gliderwatch.estimation.range import RangeParams
@@ -37,7 +37,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "nomenclature.md"
 SOURCE = ROOT / "src" / "gliderwatch"
 SETTINGS = (GliderParams, LearnerParams, RuleParams, AnomalyRule, FalseAlarmRule, Attention, AdaptiveParams)
-JOINT = (SpeedParams, JointParams, FlowParams, Tide, Surprises, Surprise, RangeParams)
+JOINT = (SpeedParams, JointParams, FlowParams, Tide, Mode, RangeParams)
 ENDS = ("_low", "_usual", "_high")
 
 
@@ -99,12 +99,11 @@ def test_values_of_the_joint_estimator() -> None:
                 assert float(value) == field.default, f"{kind.__name__}.{field.name}"
                 compared += 1
     assert compared > 25
-    flow, surprises = FlowParams(), Surprises()
-    assert shown["Tide.period"] == " and ".join(f"{tide.period:.0f}" for tide in flow.tides)
-    assert shown["Tide.amplitude"] == " and ".join(f"{tide.amplitude:g}" for tide in flow.tides)
-    each = [getattr(surprises, field.name) for field in fields(Surprises)]
-    assert shown["Surprise.chance"] == ", ".join(f"{surprise.chance:g}" for surprise in each)
-    assert shown["Surprise.size"] == ", ".join(f"{surprise.size:g}" for surprise in each)
+    tides = FlowParams().tides
+    assert shown["Tide.omega"] == ", ".join(f"{tide.omega:.7f}" for tide in tides)
+    assert shown["Tide.size"] == ", ".join(f"{tide.size:g}" for tide in tides)
+    assert shown["Mode.chance"] == ", ".join(f"{mode.chance:g}" for mode in MODES)
+    assert shown["Mode.size"] == ", ".join(f"{mode.size:g}" for mode in MODES)
 
 
 def keys_in_code() -> set[str]:

@@ -238,7 +238,8 @@ def test_dive_without_heading_is_flag_1_by_its_vertical_speed():
 def test_dive_without_heading_is_not_flagged_where_its_vertical_speed_is_as_usual():
     state, dive = after_healthy()
     verdict = step(state, dive, PARAMS)[1]
-    assert (verdict.flag, verdict.reason) == (None, "no heading for 2.9 h")
+    assert verdict.flag is Flag.NORMAL
+    assert verdict.reason == "as fast as usual by depth rate and pitch alone (no heading for 2.9 h)"
     a_little_slow = replace(dive, features=replace(dive.features, **told(0.19)))
     assert step(state, a_little_slow, PARAMS)[1].flag is None
 

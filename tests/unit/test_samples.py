@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from gliderwatch.model import Series, readonly
-from gliderwatch.navigation.samples import SPACING, after, compact, concatenated, get, joined, prepare
+from gliderwatch.navigation.constants import SPACING
+from gliderwatch.navigation.samples import after, compact, concatenated, get, joined, prepare
 from missions import segment, series
 
 

@@ -20,13 +20,35 @@ def test_shipped_grids_have_what_they_say(path):
     grid = load_grid(path.stem)
     found = cells(grid)
     sizes = sum(map(len, grid.faults.values()))
-    healthy = len(grid.healthy.seas) * grid.healthy.gliders
-    assert len(found) == sizes * len(grid.seas) * grid.gliders + healthy
+    blind = len(grid.sensors.seas) * len(grid.sensors.left_out)
+    healthy = (len(grid.healthy.seas) + blind) * grid.healthy.gliders
+    assert len(found) == sizes * (len(grid.seas) + blind) * grid.gliders + healthy
     assert len({cell.name for cell in found}) == len(found)
 
 
 def test_the_default_grid_holds_every_fault():
     assert set(load_grid("default").faults) == set(FaultKind) - {FaultKind.NONE}
+
+
+def test_each_glider_in_a_kind_of_sea_has_a_sea_of_its_own():
+    rotary = [c for c in cells(load_grid("seas")) if c.sea == "rotary"]
+    assert len({c.scenario.sea for c in rotary}) == len(rotary)
+    assert all(c.scenario.days == 30 for c in rotary)
+
+
+def test_without_a_sensor_it_is_the_same_glider_that_does_not_send_it():
+    found = {(c.sea, c.fault, c.seed): c for c in cells(load_grid("seas"))}
+    whole, blind = found["mixed", "remora", 0], found["mixed, no heading", "remora", 0]
+    assert "m_heading" in whole.scenario.cadence
+    assert "m_heading" not in blind.scenario.cadence
+    assert replace(blind.scenario, cadence=whole.scenario.cadence) == whole.scenario
+
+
+def test_real_missions_are_run_without_each_of_the_sensors(tmp_path):
+    grid = load_grid("seas")
+    real = [c for c in cells(grid, (tmp_path / "george",)) if c.mission is not None]
+    assert {c.without for c in real} == {"", *grid.sensors.left_out}
+    assert len({c.name for c in real}) == len(real)
 
 
 def test_sizes_share_a_glider_and_nothing_else_does():
@@ -44,6 +66,7 @@ def test_sizes_share_a_glider_and_nothing_else_does():
         ("faults: {remra: [2]}", "remra"),
         ("faults: {remora: [0.5]}", "remora of size 0.5"),
         ("grafts: {slowed: [2]}", "slowed of size 2"),
+        ("sensors: {left_out: [headin]}", "nothing is called headin"),
         ("onset: 12", "onset"),
         ("normal: [1.3, 0.7]", "normal"),
         ("a: [", "score.yml"),

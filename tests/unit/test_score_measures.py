@@ -160,10 +160,21 @@ def test_a_summary_is_written_and_shown(tmp_path):
     write(tmp_path / "score.json", summary)
     text = (tmp_path / "score.json").read_text()
     assert '"hours_90": null' in text
-    assert len(list(tables(summary))) == 3
+    assert len(list(tables(summary))) == 4
+
+
+def test_faults_are_shown_with_a_column_for_each_sea():
+    told = glider(told=[Told(1, ONSET + 2 * HOUR, ONSET + 3 * HOUR)], sea="rotary")
+    seas = [replace(told, sea=name) for name in ("mixed", "shallow", "deep", "slack", "front")]
+    by_sea = [t for t in tables(summarise([told, glider(), *seas], "v")) if "detected of" in str(t.title)]
+    names = [str(column.header) for table in by_sea for column in table.columns]
+    assert {"rotary", "calm", "mixed", "shallow", "deep", "slack", "front"} <= set(names)
+    cells = {str(c.header): list(c.cells) for table in by_sea for c in table.columns}
+    assert cells["rotary"] == ["100% 3 h"]
+    assert cells["calm"] == ["0%"]
 
 
 def test_without_the_package_that_draws_the_cure_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(GliderwatchError, match=r"pip install 'gliderwatch\[score\]'"):
+    with pytest.raises(GliderwatchError, match="pip install matplotlib"):
         plots.pyplot()

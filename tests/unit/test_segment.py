@@ -5,7 +5,13 @@ import numpy as np
 import pytest
 
 from gliderwatch.ingest.header import Header
-from gliderwatch.ingest.segment import QUANTITIES, SENSORS, build_segment, model_declination
+from gliderwatch.ingest.segment import (
+    QUANTITIES,
+    SENSORS,
+    build_segment,
+    depth_of,
+    model_declination,
+)
 from gliderwatch.model import SegmentId
 
 T0 = datetime(2022, 11, 7, tzinfo=UTC).timestamp()
@@ -46,10 +52,41 @@ def test_units_become_si(sensor, raw, name, value):
     assert series.v.tolist() == pytest.approx([value])
 
 
+def test_pressure_stands_in_for_a_depth_that_is_missing():
+    """UNESCO (1983), technical papers in marine science 44, p. 28: 9712.653 m at 10000 dbar, 30 degrees."""
+    bar = [0.0, 1.0, 100.0, 196.0]
+    depth = build(m_pressure=(times(4), bar)).get("depth")
+    assert depth.t.tolist() == times(4)
+    assert depth.v.tolist() == pytest.approx([0.0, 9.92, 991.3, 1935.0], rel=3e-3)
+    assert depth_of(np.array([1000.0])) == pytest.approx([9712.653], rel=3e-3)
+    empty = build(m_pressure=(times(4), bar), m_depth=([], []))
+    assert empty.get("depth").v.tolist() == depth.v.tolist()
+
+
+def test_pressure_does_not_stand_in_for_a_depth_that_is_there():
+    depth = build(m_pressure=(times(3), [1.0, 2.0, 3.0]), m_depth=([T0], [7.0])).get("depth")
+    assert depth.v.tolist() == [7.0]
+
+
 def test_positions_become_degrees():
     segment = build(m_gps_lat=([T0], [-3823.4376]), m_gps_lon=([T0], [17959.94]))
     assert segment.get("fix_lat").v.tolist() == pytest.approx([-(38 + 23.4376 / 60)])
     assert segment.get("fix_lon").v.tolist() == pytest.approx([179 + 59.94 / 60])
+
+
+@pytest.mark.parametrize(
+    ("sensors", "name"),
+    [("m_gps_lat m_gps_lon", "fix"), ("m_lat m_lon", "dr"), ("c_wpt_lat c_wpt_lon", "waypoint")],
+)
+@pytest.mark.parametrize(
+    ("raw", "lon"), [(18001.4865, -179.975225), (-18001.4865, 179.975225), (35959.4, -0.01), (36000.0, 0.0)]
+)
+def test_a_longitude_beyond_the_antimeridian_comes_back(sensors, name, raw, lon):
+    lat_name, lon_name = sensors.split()
+    segment = build(**{lat_name: (times(3), [-1722.0] * 3), lon_name: (times(3), [17958.0, raw, raw])})
+    assert segment.get(f"{name}_lon").v.tolist() == pytest.approx([179 + 58 / 60, lon, lon])
+    assert segment.notes == (f"2 values of {name}_lon beyond 180 degrees brought back to -180 to 180",)
+    assert not segment.dropped
 
 
 def test_no_fix_is_no_value_and_not_an_error():

@@ -49,7 +49,7 @@ def misfit(updates):
 def banked(updates, precision):
     bank = Bank()
     for update in updates:
-        bank = advance(bank, SHAPE, precision, KEPT, update)
+        bank = advance(bank, SHAPE, precision, np.diag(KEPT), update)
     return bank
 
 

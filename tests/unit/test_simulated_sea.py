@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import gsw
 import numpy as np
 import pytest
 
@@ -9,7 +10,6 @@ from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.ocean import Constituent, Ellipse, Front, Ocean, Sea, make_ocean
 from gliderwatch.simulate.onboard import Point, offset
 from gliderwatch.simulate.scenario import Mission, Scenario
-from gliderwatch.simulate.seawater import C_35_15_0, conductivity
 from gliderwatch.simulate.sensors import SCIENCE_CADENCE
 from gliderwatch.simulate.telemetry import CADENCE
 from gliderwatch.simulate.water import Bottom, Layer, Water
@@ -29,7 +29,7 @@ def uniform(sea: Ocean, t: np.ndarray, depth: float = 0.0) -> tuple[np.ndarray, 
 
 @pytest.mark.parametrize(
     ("constituent", "hours"),
-    [("M2", 12.4206), ("S2", 12.0), ("N2", 12.6583), ("K1", 23.9345), ("O1", 25.8193)],
+    [("M2", 12.4206), ("S2", 12.0), ("N2", 12.6583), ("K1", 23.9345), ("O1", 25.8193), ("M4", 6.2103)],
 )
 def test_each_tide_has_its_period(constituent: str, hours: float) -> None:
     tide = Ellipse(Constituent(constituent), major=0.3)
@@ -39,6 +39,15 @@ def test_each_tide_has_its_period(constituent: str, hours: float) -> None:
     rises = t[1:][(u[:-1] < 0) & (u[1:] >= 0)]
     assert np.diff(rises).mean() / 3600 == pytest.approx(hours, abs=0.02)
     assert u.max() == pytest.approx(0.3, abs=1e-3)
+
+
+def test_a_tide_comes_later_and_stronger_along_its_way() -> None:
+    tide = Ellipse(Constituent.M2, major=0.3, minor=0.1, lag=(1e-5, 0.0), growth=(0.0, 1e-6))
+    t, zero = np.arange(0.0, 2 * DAY, 60.0), np.zeros(2880)
+    here, east, north = (tide.current(t, zero + e, zero + n) for e, n in ((0, 0), (20e3, 0), (0, 100e3)))
+    late = round(0.2 / Constituent.M2.frequency / 60)  # 20 km of 1e-5 rad/m, in minutes
+    assert np.abs(east[0][late:] - here[0][:-late]).max() < 0.003
+    assert np.hypot(*north) == pytest.approx(np.exp(np.tanh(0.1)) * np.hypot(*here))
 
 
 def test_shear_takes_the_slow_current_away_with_depth_and_leaves_the_tide() -> None:
@@ -105,22 +114,6 @@ def test_what_cannot_be_is_refused(what: object, word: str) -> None:
 # --------------------------------------------------------------------------- water
 
 
-@pytest.mark.parametrize(
-    ("ratio", "temperature", "pressure", "salinity"),
-    [
-        (1.0, 15.0, 0.0, 35.0),
-        (1.2, 20.0, 2000.0, 37.245628),
-        (0.65, 5.0, 1500.0, 27.995347),
-        (1.888091, 40.0, 10000.0, 40.0),
-    ],
-)
-def test_conductivity_has_the_check_values_of_unesco_44(
-    ratio: float, temperature: float, pressure: float, salinity: float
-) -> None:
-    found = conductivity(*(np.array([x]) for x in (salinity, temperature, pressure)))
-    assert found[0] / C_35_15_0 == pytest.approx(ratio, abs=1e-6)
-
-
 def test_a_layer_moves_up_and_down_with_its_wave() -> None:
     layer = Layer(
         30.0, thickness=1.0, temperature=-8.0, salinity=1.0, amplitude=6.0, period=40e3, wavelength=20e3
@@ -165,7 +158,7 @@ def test_what_the_ctd_measures_gives_the_salinity_back() -> None:
     )
     n = len(measured)
     for salinity, sign in ((35.02, 1), (34.98, -1)):
-        bound = conductivity(np.full(n, salinity), temperature, 10 * pressure)
+        bound = 0.1 * gsw.C_from_SP(np.full(n, salinity), temperature, 10 * pressure)
         assert np.mean(sign * (bound - measured) > 0) > 0.9
 
 

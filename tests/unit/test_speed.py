@@ -76,17 +76,19 @@ def test_wrong_current_is_named():
 
 
 def test_lost_wing_is_told_where_it_rolls_the_glider():
-    made = ways(30, 5, lambda k: 0.3)
-    lost = [w if k < 15 else replace(slower(w, 0.5, hidden=True), roll=0.4) for k, w in enumerate(made)]
+    made = ways(52, 5, lambda k: 0.3)  # on the fifth day, when the tides of this sea are known
+    lost = [w if k < 36 else replace(slower(w, 0.5, hidden=True), roll=0.4) for k, w in enumerate(made)]
     _, verdicts = run(mission(lost))
-    assert Flag.ANOMALY in flags(verdicts[15:18])
+    assert Flag.ANOMALY in flags(verdicts[36:39])
     assert "wing" in verdicts[-1].reason
-    assert Flag.ANOMALY not in flags(verdicts[:15])
+    assert Flag.ANOMALY not in flags(verdicts[:36])
 
 
 def test_roll_alone_is_no_anomaly():
-    made = ways(40, 6, lambda k: 0.9 * (k // 3))
-    _, verdicts = run(mission([w if k < 15 else replace(w, roll=0.4) for k, w in enumerate(made)]))
+    made = ways(
+        64, 6, lambda k: 0.9 * (k // 3)
+    )  # from the fifth day on, when the tides of this sea are known
+    _, verdicts = run(mission([w if k < 36 else replace(w, roll=0.4) for k, w in enumerate(made)]))
     assert Flag.ANOMALY not in flags(verdicts)
 
 
@@ -142,8 +144,8 @@ def test_thruster_on_is_not_faster_than_ever():
     _, verdicts = run(mission([*sailing, *pushed]))
     assert set(flags(verdicts)) == {Flag.NORMAL}
     _, unexplained = run(mission([*sailing, *[replace(w, thruster=0.0) for w in pushed]]))
-    assert unexplained[-1].flag is Flag.FALSE_ALARM
-    assert "faster than ever" in unexplained[-1].reason
+    assert flags(unexplained[8:11]) == [None, None, Flag.NORMAL]  # a new way of flying once three dives agree
+    assert "faster than before" in unexplained[8].reason
 
 
 def test_new_deployment_forgets_what_is_normal():
@@ -165,3 +167,32 @@ def test_range_can_be_tightened():
     tight = replace(PARAMS, learning=replace(RangeParams(), narrowest=0.05, widest=0.05))
     _, verdicts = run(mission([*[Way()] * 8, *[slower(Way(), 0.12)] * 2]), tight)
     assert verdicts[-1].flag is Flag.ANOMALY
+
+
+# --------------------------------------------------------------------------- new ways of flying
+
+
+def test_a_faster_glider_is_flown_in_a_new_way():
+    made = ways(40, 9, lambda k: 0.7 * (k // 5))
+    made = [w if k < 15 else replace(w, speed=2 * w.speed, own=2 * w.own) for k, w in enumerate(made)]
+    _, verdicts = run(mission(made))
+    assert flags(verdicts[15:18]) == [None, None, Flag.NORMAL]
+    assert "flies in a new way" in verdicts[17].reason
+    assert set(flags(verdicts[18:])) == {Flag.NORMAL}
+    assert verdicts[20].normal.usual == pytest.approx(0.46, abs=0.03)
+    slowed = [w if k < 25 else slower(w, 0.4) for k, w in enumerate(made)]
+    _, verdicts = run(mission(slowed))
+    assert Flag.ANOMALY in flags(verdicts[25:28])
+
+
+def test_no_heading_is_judged_by_what_the_current_leaves():
+    """The same glider, the headings of which are not sent: on a steady course |g - c| is its speed."""
+    dives = mission(ways(40, 3, lambda k: 0.7 * (k // 5)))
+    slow = [w if k < 25 else slower(w, 0.5) for k, w in enumerate(ways(40, 3, lambda k: 0.7 * (k // 5)))]
+    for made, told in ((dives, False), (mission(slow), True)):
+        blind = [replace(d, features=replace(d.features, heading_reckoned=True)) for d in made]
+        _, verdicts = run(blind)
+        assert None not in flags(verdicts[:25])
+        assert verdicts[20].info.estimate.speed == pytest.approx(0.23, abs=0.02)
+        assert (Flag.ANOMALY in flags(verdicts[25:28])) == told
+        assert Flag.FALSE_ALARM not in flags(verdicts)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import sqlite3
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import structlog
 
 from gliderwatch.errors import DamagedError, StateError
 from gliderwatch.run import trouble
@@ -61,3 +65,47 @@ def test_it_ends_at_once_when_it_is_told_to(store: Store, monkeypatch: pytest.Mo
         raise StateError("full")
 
     assert not Trouble(store, lambda: True).spared(turn)
+
+
+def events(watch: Trouble, turn: Callable[[], None], turns: int) -> list[str]:
+    with structlog.testing.capture_logs() as log:
+        for _ in range(turns):
+            watch.spared(turn)
+    return [entry["event"] for entry in log]
+
+
+SAID, OVER = "state cannot be used, tried again", "state can be used again"
+
+
+def test_while_no_room_is_made_it_is_said_once(store: Store) -> None:
+    """A small write succeeds on the full disk, what comes next does not: that is no good news."""
+    room = False
+
+    def turn() -> None:
+        if not room:
+            raise StateError("full")
+
+    watch = Trouble(store, lambda: False)
+    assert events(watch, turn, 5) == [SAID]
+    room = True
+    assert events(watch, turn, 2) == [OVER]
+
+
+def test_a_turn_with_nothing_to_do_is_no_good_news_on_a_full_disk(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    outcomes = iter([StateError("full"), None, None, None])
+
+    def turn() -> None:
+        if (error := next(outcomes)) is not None:
+            raise error
+
+    watch = Trouble(store, lambda: False)
+    with monkeypatch.context() as disk:
+        disk.setattr(os, "posix_fallocate", full)
+        assert events(watch, turn, 3) == [SAID]
+    assert events(watch, turn, 1) == [OVER]
+    assert [path.name for path in Path(store._path).parent.iterdir() if "sqlite" not in path.name] == []

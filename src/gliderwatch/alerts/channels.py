@@ -23,6 +23,7 @@ READ_TIMEOUT = 15.0
 confirmed in time is sent again, so that Apprise's 4 s would make duplicates at a slow service."""
 
 HIDDEN = "***"
+_NOBODY = "the URL names nobody to send to: add ?to=ADDRESS, or &to=ADDRESS after other settings"
 
 _HTTP_ERROR = re.compile(r"\berror=(\d{3})\b")
 """How Apprise tells the status of an answer in its log."""
@@ -204,6 +205,8 @@ def _service(url: str) -> tuple[Any, tuple[str, ...]]:
     finally:
         logger.removeHandler(warnings)
     told = tuple(dict.fromkeys(scrub(text, url) for text in warnings.texts))
+    if service is not None and _is_mail(service) and not _names_somebody(url):
+        raise DeliveryError(_NOBODY)
     if service is None:
         reason = "; ".join(told) or "no service known for it"
         raise DeliveryError(f"not an Apprise URL that can be used: {reason}")
@@ -212,6 +215,17 @@ def _service(url: str) -> tuple[Any, tuple[str, ...]]:
     if "overflow=" not in url:
         service.overflow_mode = apprise.OverflowMode.TRUNCATE  # a cut alert says more than a refused one
     return service, told
+
+
+def _is_mail(service: Any) -> bool:
+    return str(service.url()).startswith(("mailto://", "mailtos://"))
+
+
+def _names_somebody(url: str) -> bool:
+    """Whether the URL of a mail channel says who gets its mails; if not, Apprise writes to the user here."""
+    parts = urlsplit(f"//{url.partition('://')[2]}")
+    named = {"to", "from", "user"} & parse_qs(parts.query).keys()
+    return bool(parts.username or parts.path.strip("/") or named)
 
 
 def _quiet() -> logging.Logger:

@@ -19,7 +19,7 @@ from gliderwatch.model import Assessment, Flag, Incident, Kind
 
 # Bounds above (or below) which a number is worth a line; they change no flag.
 MISFIT = 0.05  # m/s across the heading; a few mm/s to 2 cm/s when fixes, compass and current agree
-ROLL = 15.0  # degrees
+ROLL_OF_ANY = 15.0  # degrees: unusual on any glider, for one whose usual roll is not known
 PITCH_DIFFERENCE = 5.0  # degrees between dive and climb
 RATE_RATIO = 1.5  # between descent and climb
 STEADY = 0.98  # length of the mean heading vector
@@ -160,10 +160,13 @@ def _before(a: Assessment) -> list[Remark]:
 
 def _roll(a: Assessment) -> list[Remark]:
     roll = _number(a, "roll_mean")
-    if roll is None or abs(degrees(roll)) <= ROLL or has_usual(a.evidence, "roll_mean"):
+    if roll is None or abs(degrees(roll)) <= ROLL_OF_ANY or has_usual(a.evidence, "roll_mean"):
         return []
     return [
-        Remark("glider", f"mean roll {angle(roll)}, more than {ROLL:.0f}: a lost wing or a load on one side")
+        Remark(
+            "glider",
+            f"mean roll {angle(roll)}, more than {ROLL_OF_ANY:.0f}: a lost wing or a load on one side",
+        )
     ]
 
 
@@ -263,7 +266,7 @@ def _check_slow(incident: Incident, a: Assessment) -> tuple[str, ...]:
     pitch = _here(_told(a, "pitch_dive", "{} diving", angle), _told(a, "pitch_climb", "{} climbing", angle))
     depth = _here(_told(a, "depth_max", "{} m", lambda x: f"{x:.0f}"))
     return (
-        f"Roll: a step above {ROLL:.0f} degrees since the dives before is a lost wing or a load{roll}",
+        f"Roll: a step above {ROLL_OF_ANY:.0f} degrees since the dives before is a lost wing or a load{roll}",
         f"Climb time at full ballast or oil volume: slow means drag or weight (remora, net, growth){rates}",
         f"Pitch in dive against climb, and the battery position it takes{pitch}",
         f"Depth reached against depth commanded, and altitude: bottom contact or entanglement{depth}",

@@ -73,11 +73,29 @@ def reminder(
     )
 
 
-def all_clear(incident: Incident, assessment: Assessment, *, alert_id: str, audience: Severity) -> Alert:
-    """The incident is over; `assessment` is the dive that cleared it."""
+def all_clear(
+    incident: Incident,
+    assessment: Assessment,
+    *,
+    alert_id: str,
+    audience: Severity,
+    others: tuple[Incident, ...] = (),
+) -> Alert:
+    """The incident is over; `assessment` is the dive that cleared it, `others` are incidents that go on."""
     end = assessment.t_surface if incident.cleared_at is None else incident.cleared_at
-    lead = f"{_glider(incident)} is normal again: {_against_range(assessment)}. "
-    lead += f"The {_name(incident)} is over."
+    still = " and ".join(f"the {_name(other)} since {utc(other.since)}" for other in others)
+    if still:
+        lead = f"{_glider(incident)}: the {_name(incident)} is over, but not all is well: "
+        lead += f"{still} is still open. Latest dive: {flag_words(assessment)}."
+        title = f"ALL CLEAR {_glider(incident)}: {_name(incident)} over, {_name(others[0])} still open"
+    elif incident.kind is Kind.FALSE_ALARM:
+        lead = f"{_glider(incident)}: the measurements agree again, {_against_range(assessment)}. "
+        lead += f"The {_name(incident)} is over."
+        title = f"ALL CLEAR {_glider(incident)}: measurements agree, {_against_range(assessment)}"
+    else:
+        lead = f"{_glider(incident)} is normal again: {_against_range(assessment)}. "
+        lead += f"The {_name(incident)} is over."
+        title = f"ALL CLEAR {_glider(incident)}: {_against_range(assessment)}"
     page = Page(
         (lead,),
         (
@@ -87,7 +105,6 @@ def all_clear(incident: Incident, assessment: Assessment, *, alert_id: str, audi
             *_facts(assessment, 0),
         ),
     )
-    title = f"ALL CLEAR {_glider(incident)}: {_against_range(assessment)}"
     return _alert(
         incident,
         assessment.t_surface,

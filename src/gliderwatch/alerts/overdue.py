@@ -12,6 +12,10 @@ from gliderwatch.alerts.page import Page
 from gliderwatch.alerts.words import INCIDENTS, clean, duration, flow, known, map_link, place, utc
 from gliderwatch.model import Alert, Assessment, Incident, Kind, Severity
 
+_EACH = (
+    "This stands for all of them: each of the others is told by itself if it still stays away when one calls."
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Area:
@@ -30,11 +34,18 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class Fleet:
-    """The other gliders at sea: how many, how many of them ``late`` too, the last sign of life of any (s)."""
+    """The other gliders at sea: how many, how many of them ``late`` too, the last sign of life of any (s).
+
+    ``names`` are theirs. ``shore`` is the thread of a message about one of them that was for all, because
+    none called; empty where there is none, or it is over. ``back`` is when the first called after that (s).
+    """
 
     others: int = 0
     late: int = 0
     last: float | None = None
+    names: tuple[str, ...] = ()
+    shore: str = ""
+    back: float | None = None
 
     @property
     def is_silent(self) -> bool:
@@ -82,18 +93,28 @@ def overdue(absence: Absence, *, alert_id: str, thread: str, severity: Severity,
     title = f"{'' if first else 'STILL '}OVERDUE {_name(a.glider)}: silent for {silent}, "
     title += f"expected {utc(a.awaited)}"
     if a.fleet.is_silent:
-        title += ", as all others: shore side?"
+        title += f", as all {a.fleet.others + 1} gliders: shore side?"
     kind = Kind.OVERDUE if first else Kind.REMINDER
     return _alert(a.glider, a.now, kind, title, page, alert_id, thread, severity, severity)
 
 
 def called(
-    glider: str, heard: float, at: float, last: Assessment | None, *, alert_id: str, thread: str, to: Severity
+    glider: str,
+    heard: float,
+    at: float,
+    last: Assessment | None,
+    *,
+    alert_id: str,
+    thread: str,
+    to: Severity,
+    shore: bool = False,
 ) -> Alert:
-    """The glider gave a sign of life at ``at`` (s), the first since ``heard`` (s)."""
+    """The glider gave a sign of life at ``at`` (s), the first since ``heard`` (s). ``shore``: that it stayed
+    away was told together with the silence of all others."""
     silent = duration(at - heard)
+    lead = f"{_name(glider)} calls again: {utc(at)}, after {silent} of silence. It is not overdue any more."
     page = Page(
-        (f"{_name(glider)} calls again: {utc(at)}, after {silent} of silence. It is not overdue any more.",),
+        (lead, *((_EACH,) if shore else ())),
         (("Silent", f"{utc(heard)} to {utc(at)}"), *_last(last)),
     )
     title = f"ALL CLEAR {_name(glider)}: it calls again after {silent}"
@@ -152,7 +173,8 @@ def _remark(fleet: Fleet) -> tuple[str, ...]:
         return ()
     others = "the other glider is" if fleet.others == 1 else f"all {fleet.others} other gliders are"
     since = "" if fleet.last is None else f", no file of any of them since {utc(fleet.last)}"
-    return (f"Look at dockserver and modem first: {others} late as well{since}.",)
+    names = f" ({', '.join(map(_name, fleet.names))})" if fleet.names else ""
+    return (f"Look at dockserver and modem first: {others} late as well{since}{names}.", _EACH)
 
 
 def _last(dive: Assessment | None) -> tuple[tuple[str, str], ...]:

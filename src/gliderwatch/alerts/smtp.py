@@ -5,6 +5,7 @@ from __future__ import annotations
 import smtplib
 import socket
 import ssl
+from base64 import b64encode
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from email.errors import MessageError
@@ -13,6 +14,9 @@ from gliderwatch.alerts.mail import compose
 from gliderwatch.alerts.mailto import MailServer
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.model import Alert
+
+_LOGGED_IN, _GO_ON = 235, 334
+"""Answers to AUTH (RFC 4954, section 4)."""
 
 
 class DeliveryError(GliderwatchError):
@@ -85,11 +89,36 @@ def _connect(server: MailServer) -> smtplib.SMTP:
         if server.mode == "starttls":
             smtp.starttls(context=context)
         if server.login is not None:
-            smtp.login(*server.login)
+            _log_in(smtp, *server.login)
     except BaseException:
         smtp.close()
         raise
     return smtp
+
+
+def _log_in(smtp: smtplib.SMTP, user: str, password: str) -> None:
+    """Log in; user and password are sent as UTF-8 (RFC 4616, section 2), where smtplib sends ASCII alone."""
+    if (user + password).isascii():
+        smtp.login(user, password)
+        return
+    smtp.ehlo_or_helo_if_needed()
+    offered = smtp.esmtp_features.get("auth", "").upper().split()
+    if "PLAIN" in offered:
+        code, answer = smtp.docmd("AUTH", "PLAIN " + _base64(f"\0{user}\0{password}"))
+    elif "LOGIN" in offered:
+        code, answer = smtp.docmd("AUTH", "LOGIN " + _base64(user))
+        if code == _GO_ON:
+            code, answer = smtp.docmd(_base64(password))
+    else:
+        raise smtplib.SMTPNotSupportedError(
+            "it takes no password with letters beyond ASCII (no AUTH PLAIN or LOGIN): use another password"
+        )
+    if code != _LOGGED_IN:
+        raise smtplib.SMTPAuthenticationError(code, answer)
+
+
+def _base64(text: str) -> str:
+    return b64encode(text.encode("utf-8")).decode("ascii")
 
 
 def is_permanent(code: int) -> bool:

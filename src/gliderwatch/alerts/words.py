@@ -94,11 +94,12 @@ def _minutes(angle: float, positive: str, negative: str, width: int) -> str:
 
 
 def map_link(lat: float | None, lon: float | None) -> str:
-    """A map with a marker at the position; empty where it is unknown."""
+    """A map with a marker at the position, short enough for one line of a mail or terminal; empty where it is
+    unknown."""
     lat, lon = known(lat), known(lon)
     if lat is None or lon is None:
         return ""
-    return f"https://www.openstreetmap.org/?mlat={lat:.5f}&mlon={lon:.5f}#map=9/{lat:.5f}/{lon:.5f}"
+    return f"https://www.openstreetmap.org/?mlat={lat:.5f}&mlon={lon:.5f}&zoom=9"
 
 
 def angle(radians: float) -> str:

@@ -5,7 +5,7 @@ raises `ConfigError` with every problem in it; `check` looks at the folders and 
 names.
 """
 
-from gliderwatch.config.checking import check
+from gliderwatch.config.checking import Link, check, linked_gliders
 from gliderwatch.config.loading import load
 from gliderwatch.config.paths import expand
 from gliderwatch.config.problem import Problem
@@ -18,10 +18,12 @@ __all__ = [
     "Config",
     "Dockserver",
     "Glider",
+    "Link",
     "Problem",
     "Recipient",
     "State",
     "check",
     "expand",
+    "linked_gliders",
     "load",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -14,14 +14,14 @@ from gliderwatch.config.paths import FROM_GLIDER, expand, is_folder
 from gliderwatch.config.problem import Problem
 from gliderwatch.config.root import Config
 from gliderwatch.errors import ConfigError
-from gliderwatch.ingest.scan import IGNORED
+from gliderwatch.ingest.scan import is_left_out
 
 _CACHES = {".cac", ".ccc"}
 _FREE_BYTES = 200e6
 _DEEPEST = 6
 """Folders between a root and `from-glider`, as many as the scan goes through."""
-_NOT_OURS = {*IGNORED, "lost+found"}
-_LET_READ = "chmod or setfacl, or add this user to the group of the folder"
+_NOT_OURS = "lost+found"
+_LET_READ = "let this user read it: gliderwatch doctor says by which mode, group or ACL"
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,8 @@ _Findings = Iterator[_Finding]
 
 
 def check(config: Config, path: Path) -> list[Problem]:
-    """Everything outside of the settings file ``path`` that is not as it says, with the line.
+    """Everything outside of the settings file ``path`` that is not as it says, with the line, but for what
+    the service does not start with (`run.preconditions`).
 
     What can be read depends on the user: run it as the user that runs the service.
     """
@@ -92,25 +93,67 @@ def _roots(config: Config) -> _Findings:
 
 @dataclass(slots=True)
 class _Found:
-    """From-glider folders below the roots, by glider, and folders on the way to them that are closed."""
+    """From-glider folders below the roots, by glider, folders on the way to them that are closed, and links
+    in place of the folder of a glider or of its from-glider."""
 
     gliders: dict[str, list[Path]] = field(default_factory=dict)
     closed: list[Path] = field(default_factory=list)
+    links: dict[str, Path] = field(default_factory=dict)
 
     def search(self, folder: Path, depth: int = 0) -> None:
         """Look as the scan does: at any depth up to its limit, not in archives, and not through links."""
         try:
             with os.scandir(folder) as entries:
-                inside = sorted(e.name for e in entries if e.is_dir(follow_symlinks=False))
+                listed = list(entries)
+                inside = sorted(e.name for e in listed if e.is_dir(follow_symlinks=False))
+                links = sorted(e.name for e in listed if e.is_symlink())
         except OSError:
             self.closed.append(folder)
             return
+        self._note_links(folder, links)
         if FROM_GLIDER in inside:
             self.gliders.setdefault(folder.name.lower(), []).append(folder / FROM_GLIDER)
         elif depth < _DEEPEST:
             for name in inside:
-                if name.lower() not in _NOT_OURS:
+                if name != _NOT_OURS and not is_left_out(name):
                     self.search(folder / name, depth + 1)
+
+    def _note_links(self, folder: Path, names: Iterable[str]) -> None:
+        for name in names:
+            link = folder / name
+            if name == FROM_GLIDER and is_folder(link):
+                self.links.setdefault(folder.name.lower(), link)
+            elif is_folder(link / FROM_GLIDER):
+                self.links.setdefault(name.lower(), link)
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A symbolic link at ``path`` where the files of a glider should be; it leads to those in ``target``."""
+
+    path: Path
+    target: Path
+
+    def __str__(self) -> str:
+        return f"{self.path} is a symbolic link, and links are not followed: its files are not seen"
+
+    @property
+    def cure(self) -> str:
+        """What to write into the configuration, below the glider."""
+        return f"write `paths: [{self.target}]` below the glider"
+
+
+def linked_gliders(config: Config, names: Container[str]) -> dict[str, Link]:
+    """Gliders among `names` without a folder that is seen, with the link that stands in its place."""
+    return _linked(config, _found(config), names)
+
+
+def _linked(config: Config, found: _Found, names: Container[str]) -> dict[str, Link]:
+    return {
+        name: Link(path, (path if path.name == FROM_GLIDER else path / FROM_GLIDER).resolve())
+        for name, path in found.links.items()
+        if name in names and name not in found.gliders and not config.gliders[name].paths
+    }
 
 
 def _found(config: Config) -> _Found:
@@ -128,10 +171,13 @@ def _gliders(config: Config) -> _Findings:
         yield _warning("dockserver.roots", f"{folder} cannot be read: nothing below it is watched", _LET_READ)
     if not config.gliders:
         yield _warning("gliders", "no glider is configured: none is watched", "add their names")
+    links = _linked(config, search, config.gliders)
     for name, glider in config.gliders.items():
         key = f"gliders.{name}"
         yield from _unusable(f"{key}.paths", glider.paths)
-        if name not in found and not glider.paths:
+        if name in links:
+            yield _error(key, str(links[name]), links[name].cure)
+        elif name not in found and not glider.paths:
             cure = "wait for its first file, correct the name, or give `paths`"
             yield _warning(key, f"no folder {name}/{FROM_GLIDER} below the roots", cure)
         for folder in found.get(name, []):
@@ -154,33 +200,19 @@ def _caches(config: Config) -> _Findings:
 
 
 def _state(config: Config) -> _Findings:
-    key, path = "state.path", Path(config.state.path)
+    path = Path(config.state.path)
     folder = next(parent for parent in path.parents if is_folder(parent))  # the daemon makes the rest
-    if is_folder(path):
-        yield _error(key, f"{path} is a folder", "name a file in it")
-    elif not os.access(folder, os.W_OK | os.X_OK) or (
-        os.access(path, os.F_OK) and not os.access(path, os.W_OK)
-    ):
-        yield _error(key, f"{path} cannot be written by this user", "chown it")
-    elif shutil.disk_usage(folder).free < _FREE_BYTES:
-        yield _warning(key, f"less than {_FREE_BYTES / 1e6:g} MB are free in {folder}", "make room")
-    for _, root in _folders("dockserver.roots", config.dockserver.roots):
-        if path.is_relative_to(root):
-            yield _error(key, f"lies below the root {root}", "put it elsewhere")
+    if shutil.disk_usage(folder).free < _FREE_BYTES:
+        yield _warning("state.path", f"less than {_FREE_BYTES / 1e6:g} MB are free in {folder}", "make room")
 
 
 def _channels(config: Config) -> _Findings:
     for name, channel in config.channels.items():
         key = f"channels.{name}.url"
-        template = channel.url.get_secret_value()
         try:
-            url = references.resolve(template, config.folder)
-        except ConfigError as error:
-            if references.needs_credentials(template) and references.CREDENTIALS not in os.environ:
-                yield _warning(key, str(error), "credentials are only there inside of the service")
-            else:
-                yield _error(key, str(error), "set it where the service gets it from")
-            continue
+            url = references.resolve(channel.url.get_secret_value(), config.folder)
+        except ConfigError:
+            continue  # the service does not start with it: see `run.preconditions`
         from gliderwatch.alerts.channels import problem  # noqa: PLC0415 (apprise behind it is slow to load)
 
         found = problem(url)

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 _HARMLESS = re.compile(r"[\w<][\w .<>-]{0,63}")
+_SECRET = re.compile(r"://|@|[^\s/]{16,}/|/[^\s/]{16,}|.{65,}", re.DOTALL)
+"""What may be a URL with a password or a token in it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,15 +27,20 @@ class Problem:
 
 
 def shown(word: object) -> str:
-    """`word` if it can be a name, else a stand-in.
+    """`word` as it is or, if it is no usual name, in quotes; a stand-in where it may be a secret.
 
     What stands in the wrong place may be a channel's URL with its password in it, and that must
     never be printed.
 
-    >>> shown("unit_595"), shown("mailtos://me:secret@smtp.example.org")
-    ('unit_595', '***')
+    >>> shown("unit_595"), shown("unit 595!"), shown("mailtos://me:secret@smtp.example.org")
+    ('unit_595', '"unit 595!"', '***')
     """
-    return str(word) if _HARMLESS.fullmatch(str(word)) else "***"
+    text = str(word)
+    if _HARMLESS.fullmatch(text):
+        return text
+    if not text or _SECRET.search(text):
+        return "***"
+    return '"' + "".join(letter if letter.isprintable() else "?" for letter in text) + '"'
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

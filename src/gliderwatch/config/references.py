@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import stat
 from pathlib import Path
 from urllib.parse import quote
 
@@ -16,6 +17,8 @@ from gliderwatch.errors import ConfigError
 _REFERENCE = re.compile(r"\$\{([^{}]*)\}")
 _FORM = re.compile(r"[A-Za-z_][A-Za-z0-9_]*|file:.*\S.*|credential:[A-Za-z0-9_.-]+")
 CREDENTIALS = "CREDENTIALS_DIRECTORY"
+_LARGEST = 64 * 1024
+"""Bytes of a file with a secret."""
 
 
 def needs_credentials(template: str) -> bool:
@@ -82,8 +85,19 @@ def _value(name: str, base: Path) -> str:
 
 
 def _read(path: Path, source: str) -> str:
+    """The text of a small regular file: a device may have no end, and a FIFO nobody who writes."""
     try:
-        return path.read_text(encoding="utf-8")
+        if not stat.S_ISDIR(mode := path.stat().st_mode) and not stat.S_ISREG(mode):
+            raise ConfigError(f"{source} is no regular file: put the secret into one")
+        with open(path, "rb", opener=_open_at_once) as file:
+            data = file.read(_LARGEST + 1)
+        if len(data) > _LARGEST:
+            raise ConfigError(f"{source} is larger than {_LARGEST // 1024} kB: it must hold one line of text")
+        return data.decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not UTF-8 text"
         raise ConfigError(f"{source} cannot be read: {reason}") from None
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK | os.O_NOCTTY)

@@ -65,10 +65,6 @@ class Config(Section):
             settings.unknown_dives,
         )
 
-    def defaults_params(self) -> GliderParams:
-        """Parameters of a glider that has no settings of its own."""
-        return self._settings(Glider()).params()
-
     def locate(self, key: str) -> int:
         """The line of a dotted key (`channels.mail.url`, `dockserver.roots.0`) in the file."""
         return self._document.line(key)

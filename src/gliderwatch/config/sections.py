@@ -127,7 +127,9 @@ class Rules(Section):
     anomaly: Anomaly = Field(default=Anomaly(), description="Flag 1.")
     false_alarm: FalseAlarm = Field(default=FalseAlarm(), description="Flag 2.")
     reminder_hours: Annotated[Number, Field(gt=0, le=8760)] | None = Field(
-        default=_R.reminder_hours, description="Hours between reminders of an open incident; null: none."
+        default=_R.reminder_hours,
+        description="Hours until an open incident is brought to mind; again after 2, 4, 7, 14, ... times "
+        "that; null: none.",
     )
 
 

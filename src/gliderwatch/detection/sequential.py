@@ -93,11 +93,11 @@ def advance(bank: Bank, shape: Array, precision: Array, kept: Array, update: Upd
     """The bank after one more dive.
 
     ``shape`` ((n, q)) is what a step does to the state, ``precision`` ((q, q)) what is known of its size
-    before, ``kept`` ((n,)) the diagonal transition to the dive.
+    before, ``kept`` ((n, n)) the transition to the dive.
     """
     n, q = shape.shape
     old = 1 - WINDOW
-    shift = np.concatenate([bank.shift.reshape(-1, n, q)[old:] * kept[:, None], shape[None]])
+    shift = np.concatenate([kept @ bank.shift.reshape(-1, n, q)[old:], shape[None]])
     info = np.concatenate([bank.info.reshape(-1, q, q)[old:], precision[None]])
     score = np.concatenate([bank.score.reshape(-1, q)[old:], np.zeros((1, q))])
     seen = update.rows @ shift

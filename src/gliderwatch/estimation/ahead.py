@@ -17,10 +17,11 @@ def mean_flow(
 
     ``ground`` (m/s, (2,)) is about how fast the glider goes over ground: a strong current differs along it.
     """
-    n, dt = params.size, max((start + end) / 2 - state.t, 0.0)
-    now = flow.mean_flow(state.t, state.t, params) @ state.x[:n]
-    kept = flow.transition(dt, params)
-    added = flow.noise(dt, state.sea, flow.crossing(now, ground, dt, params), params)
-    cov = kept[:, None] * state.cov[:n, :n] * kept + np.diag(added)
-    rows = flow.mean_flow(start, end, params)
-    return rows @ (kept * state.x[:n]), np.asarray(rows @ cov @ rows.T)
+    n, lat = params.size, 0.0 if state.end is None else state.end.lat
+    q = flow.intensities(state.x[:n], state.sea, params)
+    passage = flow.passage(max(start - state.t, 0.0), max(end - start, 1.0), lat, q, params)
+    mean = passage.matrix @ state.x[:n]
+    cov = passage.matrix @ state.cov[:n, :n] @ passage.matrix.T + passage.noise
+    now = state.x[0:2] + state.x[2:4]
+    crossed = flow.crossing(now, ground, max((start + end) / 2 - state.t, 0.0), params)
+    return mean[params.mean], np.asarray(cov[params.mean, params.mean] + state.sea * crossed**2 * np.eye(2))

@@ -14,7 +14,9 @@ def blank(dive: Dive, params: GliderParams, digest: str, reason: str) -> Assessm
     ``digest`` identifies the parameters.
     """
     place = dive.end if dive.end is not None else dive.start
-    closed = closure(dive.track, dive.current) if dive.track and dive.current else None
+    # where nothing tells the course there is nothing along it, or across
+    known = dive.track is not None and not dive.features.heading_assumed
+    closed = closure(dive.track, dive.current) if known and dive.track and dive.current else None
     return Assessment(
         glider=dive.glider,
         segment=dive.segment,

@@ -1,25 +1,33 @@
-"""How a dive can be explained, and which explanation is the likeliest. Pure.
+"""How a dive can be explained: the table of modes, and how likely each is after a dive. Pure.
 
-A multi-process model (Harrison and Stevens 1976): beside "as usual" a dive may show another speed,
-another flow, a wrong current or a wrong ground velocity. Each opens the variance of one thing; the
-innovations then say which of them is meant.
+A multi-process model (Harrison and Stevens 1976): beside "as usual" a dive may show another speed, another
+flow, a wrong current or a wrong ground velocity; and the speed that the glider tells beside the current may
+have nothing to do with the speed. Each mode opens one thing. An iterated update finds the likeliest state
+under each, log-sum-exp over the modes their weights, and the state after the dive is the mixture (GPB of
+order one).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from enum import StrEnum
-from math import exp, log, pi, sqrt
+from math import log, pi, sqrt
 
 import numpy as np
 
-from gliderwatch.estimation.flow import LASTING
-from gliderwatch.estimation.measurement import OWN, Linear
-from gliderwatch.estimation.reckoned import Reckoned
+from gliderwatch.estimation.measurement import FASTEST, OWN, SIDE, SLIP, Measured, expected
 from gliderwatch.model import Array
 
-FASTEST = 1.3
-"""m/s: no glider flies faster through the water, and none backwards."""
+ITERATIONS = 2
+BEYOND = 0.02
+"""m/s by which a speed may be found beyond what a glider can fly, before that speaks against an
+explanation."""
+STAYS = 0.6
+"""Chance that a current, or a ground velocity, which is wrong on one dive is wrong on the next one too: a
+fault lasts."""
+LEFT_OUT = 10.0
+"""m/s: error given to a measurement that is wrong: it is left out, be it as near as it may."""
 
 
 class Cause(StrEnum):
@@ -30,6 +38,7 @@ class Cause(StrEnum):
     FLOW = "another flow"
     CURRENT = "wrong current"
     GROUND = "wrong ground velocity"
+    WING = "a wing lost or bent"
 
     @property
     def is_error(self) -> bool:
@@ -38,115 +47,140 @@ class Cause(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Surprise:
-    """``chance`` of it on a dive, and how large it usually is (m/s, a component)."""
+class Mode:
+    """``chance`` of it on a dive, how large what it opens usually is (``size``, m/s, a component), and the
+    ``words`` for a dive that it explains best."""
 
+    cause: Cause
     chance: float
     size: float
+    words: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Surprises:
-    """The causes but for the usual one."""
-
-    speed: Surprise = Surprise(0.02, 0.2)
-    flow: Surprise = Surprise(0.03, 0.25)
-    current: Surprise = Surprise(0.02, 0.4)
-    ground: Surprise = Surprise(0.01, 0.3)
-
-    def by_cause(self) -> dict[Cause, Surprise]:
-        """The surprise of each cause; of the usual one what is left of the chances."""
-        told = {
-            Cause.SPEED: self.speed,
-            Cause.FLOW: self.flow,
-            Cause.CURRENT: self.current,
-            Cause.GROUND: self.ground,
-        }
-        return {Cause.USUAL: Surprise(1 - sum(each.chance for each in told.values()), 0.0), **told}
+MODES = (
+    Mode(Cause.USUAL, 0.92, 0.0),
+    Mode(Cause.SPEED, 0.02, 0.2),
+    Mode(Cause.FLOW, 0.03, 0.25),
+    Mode(Cause.CURRENT, 0.02, 0.4, "the current does not fit those before, the ground velocity does"),
+    Mode(
+        Cause.GROUND,
+        0.01,
+        0.3,
+        "the ground velocity does not fit, the current does: fixes or headings are wrong",
+    ),
+)
 
 
-def opened(linear: Linear, cov: Array, cause: Cause, size: float) -> tuple[Linear, Array]:
-    """The measurements and the covariance ((n, n)) of the state, if that is the cause."""
-    more, wrong = np.zeros(len(cov)), np.zeros(len(linear.rows))
-    if cause is Cause.SPEED:
-        more[OWN] = size**2
-    elif cause is Cause.FLOW:
-        more[LASTING] = size**2
-    elif cause is Cause.CURRENT:
-        wrong[2:4] = size**2
-    elif cause is Cause.GROUND:
-        wrong[:2] = size**2
-    return Linear(linear.rows, linear.innovation, linear.noise + np.diag(wrong)), cov + np.diag(more)
-
-
-@dataclass(frozen=True, slots=True)
-class Told:
-    """What is known of W beside the measurements: as the glider ``tells`` it, at the predicted state ``x``
-    ((n,))."""
-
-    tells: Reckoned
-    x: Array
-
-
-@dataclass(frozen=True, slots=True)
-class Odds:
-    """Probability of a cause, and W as the glider tells it, if that fits where this is the cause."""
-
-    chance: float
-    told: Told | None
-
-
-def odds(
-    expected: Linear,
-    actual: Linear,
-    cov: Array,
-    own: float | None,
-    surprises: Surprises,
-    told: Told | None = None,
-) -> dict[Cause, Odds]:
-    """The odds of each cause.
-
-    ``expected`` is linear about the own speed that was expected, ``actual`` about the one that ground
-    velocity and current give, ``own`` (m/s): that is none where one of the two is wrong. Without a
-    current only speed and flow can be in question.
-    """
-    possible = surprises.by_cause()
-    if len(actual.rows) == 2:
-        possible = {cause: each for cause, each in possible.items() if not cause.is_error}
-    if own is not None and not 0 < own < FASTEST:
-        del possible[Cause.SPEED]
-    without = right = _log_densities(possible, expected, actual, cov)
-    if told is not None:
-        without = [each + log(told.tells.lies / FASTEST) + log(sqrt(2 * pi)) for each in without]
-        expected, actual = (each.with_own(told.x, told.tells) for each in (expected, actual))
-        with_it = _log_densities(possible, expected, actual, cov)
-        right = [each + log(1 - told.tells.lies) for each in with_it]
-    logs = [
-        log(each.chance) + max(pair)
-        for each, pair in zip(possible.values(), zip(without, right, strict=True), strict=True)
-    ]
-    most = max(logs)
-    total = sum(exp(each - most) for each in logs)
-    return {
-        cause: Odds(exp(each - most) / total, told if right[i] > without[i] else None)
-        for i, (cause, each) in enumerate(zip(possible, logs, strict=True))
+def switched(modes: tuple[Mode, ...], before: Mapping[Cause, float]) -> tuple[Mode, ...]:
+    """The modes with the chances that they have after a dive which was explained so ``before``: what is
+    wrong stays."""
+    rare = {
+        mode.cause: max(mode.chance, STAYS * before.get(mode.cause, 0.0))
+        for mode in modes
+        if mode.cause.is_error
     }
+    left = 1 - sum(rare.values())
+    rest = sum(mode.chance for mode in modes if not mode.cause.is_error)
+    return tuple(
+        replace(mode, chance=rare.get(mode.cause, mode.chance / rest * left if rest else left))
+        for mode in modes
+    )
 
 
-def _log_densities(
-    possible: dict[Cause, Surprise], expected: Linear, actual: Linear, cov: Array
-) -> list[float]:
-    """Log density of the innovation, but for a constant, of each cause."""
-    each = [
-        opened(expected if cause.is_error else actual, cov, cause, surprise.size)
-        for cause, surprise in possible.items()
-    ]
-    rows = np.array([linear.rows for linear, _ in each])
-    noise = np.array([linear.noise for linear, _ in each])
-    innovations = np.array([linear.innovation for linear, _ in each])
-    s = rows @ np.array([cov for _, cov in each]) @ rows.transpose(0, 2, 1) + noise
-    solved = np.linalg.solve(s, innovations[:, :, None])[:, :, 0]
-    squares = [float(e @ x) for e, x in zip(innovations, solved, strict=True)]
+ROLLED = Mode(Cause.WING, 9.0, 0.45)
+"""Beside these where the glider has just begun to roll otherwise, which little else does: nine to one.
+``size`` is of slip, a third of that of side."""
+
+
+@dataclass(frozen=True, slots=True)
+class Explained:
+    """A dive as one of the modes has it.
+
+    ``cause`` with its ``weight``, and whether the glider ``believes``: the speed that it tells fits.
+    ``rows`` ((m, 5)), ``innovation`` ((m,)) and ``noise`` ((m, m)) are linear about the likeliest state;
+    ``square`` is the innovation normalised.
+    """
+
+    cause: Cause
+    size: float
+    weight: float
+    believes: bool
+    rows: Array
+    innovation: Array
+    noise: Array
+    weight_matrix: Array
+
+    @property
+    def square(self) -> float:
+        """The normalised innovation squared."""
+        return float(self.innovation @ self.weight_matrix @ self.innovation)
+
+
+def explain(
+    x: Array, cov: Array, jumped: Array, measured: Measured, modes: tuple[Mode, ...]
+) -> list[Explained]:
+    """The dive in each of the modes, with weights that add up to 1.
+
+    ``x`` ((5,)) and ``cov`` ((5, 5)) are what was expected of the numbers that a dive shows, ``jumped`` ((5,
+    5)) how these vary where the flow steps by 1 m/s.
+    """
+    if not measured.has_current:
+        modes = tuple(mode for mode in modes if not mode.cause.is_error)
+    tells = measured.tells
+    fits = (True, False) if tells is not None else (False,)
+    each = [(mode, believes) for mode in modes for believes in fits]
+    opened, wrong, logs = _opened(each, cov, jumped, measured)
+    state, values = np.tile(x, (len(each), 1)), measured.values
+    for _ in range(ITERATIONS):
+        found, slope, noise = expected(state, measured)
+        noise = noise + wrong
+        turned = opened @ slope.transpose(0, 2, 1)
+        s = slope @ turned + noise
+        inverse = np.linalg.inv(s)
+        innovation = values - found - (slope @ (x - state)[:, :, None])[:, :, 0]
+        state = x + (turned @ (inverse @ innovation[:, :, None]))[:, :, 0]
+        free = state[:, OWN].copy()
+        state[:, OWN] = np.clip(free, 0.0, FASTEST)
+        state[:, SLIP:] = np.clip(state[:, SLIP:], [-0.1, -0.85], [0.95, 0.85])
+    beyond = np.maximum(np.maximum(-free, free - FASTEST), 0.0)
+    logs = logs - 0.5 * (beyond / BEYOND) ** 2
+    squares = np.einsum("ki,kij,kj->k", innovation, inverse, innovation)
+    logs = logs - 0.5 * (np.linalg.slogdet(s)[1] + squares)
+    weights = np.exp(logs - logs.max())
+    weights /= weights.sum()
+    left_out = wrong > 0
+    noise = np.where(left_out, LEFT_OUT**2, noise)
+    at = np.flatnonzero(left_out.any(axis=(1, 2)))
+    inverse[at] = np.linalg.inv(slope[at] @ turned[at] + noise[at])
     return [
-        -0.5 * (square + float(size)) for square, size in zip(squares, np.linalg.slogdet(s)[1], strict=True)
+        Explained(
+            mode.cause, mode.size, float(weights[k]), believes, slope[k], innovation[k], noise[k], inverse[k]
+        )
+        for k, (mode, believes) in enumerate(each)
     ]
+
+
+def _opened(
+    each: list[tuple[Mode, bool]], cov: Array, jumped: Array, measured: Measured
+) -> tuple[Array, Array, Array]:
+    """Covariances of the state ((k, 5, 5)), what is added to the noise ((k, m, m)), and logarithms of the
+    chances ((k,)), of modes and of whether the speed that the glider tells fits."""
+    tells, m = measured.tells, len(measured.values)
+    opened, wrong, logs = np.tile(cov, (len(each), 1, 1)), np.zeros((len(each), m, m)), np.zeros(len(each))
+    for k, (mode, believes) in enumerate(each):
+        logs[k] = log(mode.chance)
+        if mode.cause is Cause.SPEED:
+            opened[k, OWN, OWN] += mode.size**2
+        elif mode.cause is Cause.FLOW:
+            opened[k] += mode.size**2 * jumped
+        elif mode.cause is Cause.WING:
+            opened[k][[SLIP, SIDE], [SLIP, SIDE]] += np.square([mode.size, mode.size / 3])
+        elif mode.cause.is_error:
+            at = slice(2, 4) if mode.cause is Cause.CURRENT else slice(0, 2)
+            wrong[k, at, at] = mode.size**2 * np.eye(2)
+        if tells is not None:
+            logs[k] += log(1 - tells.lies) if believes else log(tells.lies)
+            if not believes:  # it may be anything: of density 1 / FASTEST
+                wrong[k, -1, -1] = FASTEST**2
+                logs[k] += log(sqrt(2 * pi))
+    return opened, wrong, logs

@@ -1,110 +1,207 @@
-"""What the flow at a glider does from dive to dive: a Gaussian process as a linear state. Pure.
+"""The one model of the sea: what the flow at a glider does, as a linear Gaussian state. Pure.
 
-Each component of the flow is the sum of a lasting part that wanders (random walk), a passing part that fades
-(Ornstein-Uhlenbeck), and tides with slowly changing amplitudes (002: cos and sin of each constituent,
-averaged over the dive). State, 4 + 4 numbers a constituent: lasting east, north; passing east,
-north; then of each constituent cos east, sin east, cos north, sin north (m/s).
+The flow, east + i north, is a sum of complex parts that know nothing of each other,
+
+    dz = (i omega - 1 / tau) z dt + sqrt(q) dB
+
+a lasting part and a passing one (omega 0), inertial motion (clockwise at the Coriolis frequency in the
+north), and two rotary parts a tidal constituent, one each way round: any ellipse is the sum of the two, and
+what they wander in time makes spring, neap and the way from one sea to the next. How strong the tides are is
+learnt from the mission: their prior reaches from nothing to 1 m/s, and they wander by a part of what they
+have been found to be. What is not known yet is wide, not wrong.
+
+State: east and north of each part at the end of the last dive, then east and north of the mean flow over
+that dive (m/s). The mean is the integral over the dive divided by its length, exact for any length and any
+gap between dives: it is what a depth-averaged current measures, and times the length it is the displacement
+by the water (002).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from gliderwatch.currents.constituents import Constituent
 from gliderwatch.model import Array, readonly
 
 HOUR, DAY = 3600.0, 86400.0
+EARTH = 7.292115e-5
+"""Angular frequency of the earth's rotation (rad/s)."""
 LASTING = slice(0, 2)
 """Place of the lasting part in the state: there a flow changes for good, as at a front."""
+FIXED = 3
+"""Parts before those of the tides: lasting, passing, inertial."""
+_SMALL = 1e-4
+"""|a| T below which the first terms of the series are taken: the closed forms cancel there."""
+
+Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True)
 class Tide:
-    """A tidal constituent: period (s), usual amplitude of cos and sin in a component (m/s)."""
+    """A tidal constituent: angular speed (rad/s), usual size of each rotary part in a component (m/s)."""
 
-    period: float
-    amplitude: float
+    omega: float
+    size: float
 
 
 @dataclass(frozen=True, slots=True)
 class FlowParams:
-    """Sizes and memories of the parts, in a component.
+    """Sizes (m/s) and memories (s) of the parts, in a component.
 
-    ``lasting`` usual size of the lasting part (m/s) and ``wander`` its change in a day (m/s); ``passing``
-    usual size of the passing part (m/s) and ``memory`` its time constant (s); ``tide_wander`` the part of
-    a tide's amplitude that changes in a day; ``scale`` (m) over which currents differ by their own size.
+    ``lasting``, ``passing`` and ``inertial`` with their memories; ``tide_wander`` the part of a tidal part
+    that changes in a day, of what it is and of ``tide_least`` (m/s) at least; ``scale`` (m) over which
+    currents differ by their own size.
     """
 
     lasting: float = 0.3
-    wander: float = 0.1
+    lasting_memory: float = 18 * DAY
     passing: float = 0.08
     memory: float = 30 * HOUR
-    tides: tuple[Tide, ...] = (Tide(12.4206 * HOUR, 0.06), Tide(23.9345 * HOUR, 0.04))
-    tide_wander: float = 0.1
+    inertial: float = 0.06
+    inertial_memory: float = 3 * DAY
+    tides: tuple[Tide, ...] = (
+        Tide(Constituent.M2.omega, 0.25),
+        Tide(Constituent.S2.omega, 0.12),
+        Tide(Constituent.N2.omega, 0.06),
+        Tide(Constituent.K1.omega, 0.15),
+        Tide(Constituent.O1.omega, 0.12),
+    )
+    tide_wander: float = 0.08
+    tide_least: float = 0.005
     scale: float = 60e3
+
+    @property
+    def parts(self) -> int:
+        """How many parts the flow has."""
+        return FIXED + 2 * len(self.tides)
 
     @property
     def size(self) -> int:
         """How many numbers the state has."""
-        return 4 + 4 * len(self.tides)
+        return 2 * self.parts + 2
 
     @property
-    def amplitudes(self) -> list[float]:
-        """Usual sizes of the tidal part of the state (m/s)."""
-        return [tide.amplitude for tide in self.tides for _ in range(4)]
+    def mean(self) -> slice:
+        """Place of the mean flow over the last dive in the state."""
+        return slice(self.size - 2, self.size)
+
+
+@dataclass(frozen=True, slots=True)
+class Passage:
+    """What a gap and the dive after it make of the state: ``matrix`` and ``noise`` ((size, size)).
+
+    ``restless`` (m2/s2) is the variance of a component of the mean flow that is new and no tide.
+    """
+
+    matrix: Array
+    noise: Array
+    restless: float
 
 
 def prior(params: FlowParams) -> Array:
     """Variance (m2/s2, (size,)) of the state before any dive; its mean is zero."""
-    return np.square([params.lasting] * 2 + [params.passing] * 2 + params.amplitudes)
+    sizes = [params.lasting, params.passing, params.inertial]
+    sizes += [tide.size for tide in params.tides for _ in range(2)]
+    return np.concatenate([np.repeat(np.square(sizes), 2), [0.0, 0.0]])
 
 
-def transition(dt: float, params: FlowParams) -> Array:
-    """What is left of each number after ``dt`` seconds, (size,)."""
-    kept = np.ones(params.size)
-    kept[2:4] = math.exp(-dt / params.memory)
-    return kept
+def rates(lat: float, params: FlowParams) -> Complex:
+    """i omega - 1 / tau of each part (1/s, (parts,)) at a latitude (degrees)."""
+    fixed = [
+        -1 / params.lasting_memory,
+        -1 / params.memory,
+        -1 / params.inertial_memory - 2j * EARTH * math.sin(math.radians(lat)),
+    ]
+    return np.array(fixed + [way * 1j * tide.omega for tide in params.tides for way in (1, -1)])
 
 
-def noise(dt: float, factor: float, crossed: float, params: FlowParams) -> Array:
-    """Variance (m2/s2, (size,)) that ``dt`` seconds add to each number.
+def intensities(state: Array, sea: float, params: FlowParams) -> Array:
+    """q of each part (m2/s3, (parts,)) where the state is ``state`` ((size,)).
 
-    ``factor`` multiplies that of the parts which are not tide. ``crossed`` (m/s) is by how much the flow
-    usually differs along the way of the glider, see `crossing`.
+    ``sea`` is a factor on those of the parts that are no tides.
     """
-    lasting = factor * (params.wander**2 * dt / DAY + crossed**2)
-    passing = factor * params.passing**2 * -math.expm1(-2 * dt / params.memory)
-    tides = np.square(params.amplitudes) * params.tide_wander**2 * dt / DAY
-    return np.concatenate([[lasting] * 2, [passing] * 2, tides])
+    fixed = [
+        2 * params.lasting**2 / params.lasting_memory,
+        2 * params.passing**2 / params.memory,
+        2 * params.inertial**2 / params.inertial_memory,
+    ]
+    tidal = np.square(state[2 * FIXED : -2]).reshape(-1, 2).mean(axis=1)
+    least = params.tide_least**2
+    return np.concatenate([sea * np.array(fixed), params.tide_wander**2 / DAY * (tidal + least)])
+
+
+def passage(gap: float, dive: float, lat: float, q: Array, params: FlowParams) -> Passage:
+    """What a ``gap`` and then a ``dive`` (s) make of the state, with intensities ``q`` ((parts,)).
+
+    The stochastic integrals are exact: two gaps do what one of their length does.
+    """
+    a = rates(lat, params)
+    kept = np.exp(a * gap)
+    gained = q * _squared(a, gap)
+    phi, integral = np.exp(a * dive), _integral(a, dive)
+    mean, cross, own = integral / dive, *_wandered(a, dive)
+    n, m = params.size, params.parts
+    matrix, noise, each = np.zeros((n, n)), np.zeros((n, n)), np.arange(m)
+    _put(matrix, phi * kept, each, each)
+    _put(matrix, mean * kept, m, each)
+    _put(noise, q * _squared(a, dive) + gained * np.abs(phi) ** 2, each, each)
+    shared = q * cross / dive + gained * mean * np.conj(phi)
+    _put(noise, shared, m, each)
+    _put(noise, np.conj(shared), each, m)
+    new = q * own / dive**2 + gained * np.abs(mean) ** 2
+    _put(noise, new.sum(), m, m)
+    return Passage(matrix, noise, float(new[:FIXED].sum()))
+
+
+@cache
+def jump(params: FlowParams) -> Array:
+    """What a step of the lasting part before a dive does to the state, (size, 2): east and north."""
+    out = np.zeros((params.size, 2))
+    out[LASTING] = out[params.mean] = np.eye(2)
+    return readonly(out)
 
 
 def crossing(flow: Array, ground: Array, dt: float, params: FlowParams) -> float:
     """By how much (m/s) a flow (m/s, (2,)) usually differs after ``dt`` seconds at a velocity over ground.
 
-    A strong current is a narrow one: it differs by its own size over a distance of ``params.scale``.
+    A strong current is a narrow one: it differs by its own size over a distance of ``params.scale``. Tides
+    are wider: only the other parts are meant.
     """
     return float(np.hypot(*flow)) * min(float(np.hypot(*ground)) * dt / params.scale, 1.0)
 
 
-@lru_cache(maxsize=64)
-def mean_flow(start: float, end: float, params: FlowParams) -> Array:
-    """The rows (2, size) that give the mean flow (east, north) between two times (s) from the state.
+def _squared(a: Complex, t: float) -> Array:
+    """Integral of |exp(a s)|^2 over ``t`` (s)."""
+    x = 2 * a.real * t
+    return np.asarray(np.where(np.abs(x) < _SMALL, t * (1 + x / 2), np.expm1(x) / np.where(x == 0, 1, x) * t))
 
-    A tide averaged over T is sinc(omega T / 2) times that in the middle (002).
 
-    >>> m2 = FlowParams(tides=(Tide(360 / 28.9841042 * HOUR, 0.1),))
-    >>> mean_flow(0.0, 3 * HOUR, m2)[0].round(5).tolist()
-    [1.0, 0.0, 1.0, 0.0, 0.658, 0.6239, 0.0, 0.0]
-    """
-    rows = np.zeros((2, params.size))
-    rows[[0, 1], [0, 1]] = rows[[0, 1], [2, 3]] = 1.0
-    for i, tide in enumerate(params.tides):
-        half = math.pi * (end - start) / tide.period
-        smooth = math.sin(half) / half if half > 0 else 1.0
-        angle = math.pi * (start + end) / tide.period
-        at = 4 + 4 * i
-        rows[0, at : at + 2] = rows[1, at + 2 : at + 4] = smooth * math.cos(angle), smooth * math.sin(angle)
-    return readonly(rows)
+def _integral(a: Complex, t: float) -> Complex:
+    """Integral of exp(a s) over ``t`` (s)."""
+    return np.asarray(np.where(np.abs(a * t) < _SMALL, t * (1 + a * t / 2), np.expm1(a * t) / a))
+
+
+def _wandered(a: Complex, t: float) -> tuple[Complex, Array]:
+    """Covariance of the integral of what chance adds with that itself, and its variance, at unit
+    intensity."""
+    square, linear, small = _squared(a, t), _integral(a, t), np.abs(a * t) < _SMALL
+    cross = np.where(small, t**2 / 2, (square - np.conj(linear)) / a)
+    own = np.where(small, t**3 / 3, (square - 2 * linear.real + t) / np.abs(a) ** 2)
+    return cross, own
+
+
+def _put(matrix: Array, values: Any, rows: Any, columns: Any) -> None:
+    """Add complex factors as real blocks of two by two at pairs of places."""
+    blocks = matrix.reshape(len(matrix) // 2, 2, -1, 2)
+    values, real = np.asarray(values), np.real(values)
+    blocks[rows, 0, columns, 0] += real
+    blocks[rows, 1, columns, 1] += real
+    if np.iscomplexobj(values):
+        blocks[rows, 1, columns, 0] += values.imag
+        blocks[rows, 0, columns, 1] -= values.imag

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from gliderwatch.detection.sequential import Bank, Step, Update, advance, likeliest, ratio_bound
-from gliderwatch.estimation.flow import LASTING
 from gliderwatch.estimation.measurement import SIDE, SLIP
 from gliderwatch.model import Array
 
@@ -19,22 +18,21 @@ MOST = 4.0
 
 
 def steps(
-    bank: Bank, kept: Array, update: Update, sea: float, front: float
+    bank: Bank, matrix: Array, update: Update, jump: Array, front: float
 ) -> tuple[Step | None, Step | None, Bank]:
     """The likeliest loss (a step up in slip) and turn (one in side), and the bank with one more dive.
 
-    ``kept`` ((n,)) is the transition to the dive and ``update`` that of the filter. The flow may have changed
-    together with the step: by ``front`` (m/s, a component) in a usual sea, more where ``sea`` is above 1.
-    No dive alone may prove a step.
+    ``matrix`` ((n, n)) is the transition to the dive and ``update`` that of the filter. The flow may have
+    changed together with the step, by ``front`` (m/s, a component), which does ``jump`` ((n, 2)) to the
+    state. No dive alone may prove a step.
     """
-    n = len(kept)
-    shape = np.zeros((n, 4))
-    shape[[n + SLIP, n + SIDE], [0, 1]] = 1.0
-    shape[[LASTING.start, LASTING.start + 1], [2, 3]] = 1.0
+    shape = np.zeros((len(matrix), 4))
+    shape[[SLIP, SIDE], [0, 1]] = 1.0
+    shape[:, 2:] = jump
     sizes = np.array([LARGEST, LARGEST, front, front])
     square = float(update.innovation @ update.weight @ update.innovation)
     believed = update.innovation * min(1.0, MOST / math.sqrt(max(square, 1e-12)))
-    bank = advance(bank, shape, np.diag(sizes**-2), kept, replace(update, innovation=believed))
+    bank = advance(bank, shape, np.diag(sizes**-2), matrix, replace(update, innovation=believed))
     return likeliest(bank, 0, sign=1), likeliest(bank, 1), bank
 
 

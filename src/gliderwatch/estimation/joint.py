@@ -1,62 +1,60 @@
-"""Speed and flow together: an extended Kalman filter, one dive a step. Pure.
+"""Speed and flow together: a switching Kalman filter, one dive a step. Pure.
 
-State: the flow (see `flow`), the speed W that the glider itself believes, and how its real way through the
-water differs from that in the frame of its heading, as parts of W: slip along, side across. With h the
-mean heading vector of a dive and h' that vector turned left, a dive measures
-
-    g = F + W ((1 - s) h - d h')        ground velocity
-    c = F - W (s h + d h')              depth-averaged current, so that g - c = W h
-
-with s = slip of physics + slip, d = side. So W is seen at once, and with it any drag on the whole body. What
-the glider itself does not know (angle of attack, lost wing, wrong compass) is in c as well: it can be
-seen only where the flow lasts while the heading turns. A test for a step (`detection.sequential`)
-looks for it; when it speaks, slip and side are opened by as much as the step is uncertain.
+State: the flow (see `flow`), and at its end the speed W that the glider reckons with, slip and side (see
+`measurement`). g - c = W h, so W is seen at once in any sea, and with it any drag on the whole body. What
+the glider itself does not know (angle of attack, lost wing, wrong compass) is in c as well: it can be seen
+only where the flow lasts while the heading turns. A test for a step (`detection.sequential`) looks for it;
+when it speaks, slip and side are opened by as much as the step is uncertain, within what a wing or a
+compass can do.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
 from gliderwatch.detection.sequential import Bank, Step, Update
 from gliderwatch.estimation import flow, hidden
-from gliderwatch.estimation.causes import FASTEST, Cause, Surprises, Told, odds, opened
-from gliderwatch.estimation.flow import FlowParams
-from gliderwatch.estimation.measurement import OWN, SIDE, SLIP, Guess, Linear, drag_slip, measure
+from gliderwatch.estimation.causes import MODES, ROLLED, Cause, Explained, Mode, explain, switched
+from gliderwatch.estimation.flow import FlowParams, Passage
+from gliderwatch.estimation.measurement import FASTEST, OWN, SHOWN, SIDE, SLIP, Measured, Slipping, slip_of
 from gliderwatch.estimation.noise import learn_doubt, learn_sea
 from gliderwatch.estimation.observation import Observation, are_apart, observe
 from gliderwatch.estimation.reckoned import Reckoned
 from gliderwatch.model import Array, Dive, Fix, readonly
 
-LOST, TURNED = 0.3, 0.1
-"""Slip and side (parts of W) that a damaged wing may add: by this they are opened where it is hinted at."""
-SLOWEST = 0.02
-"""m/s: own speed about which the filter is linear on a glider that seems to stand still."""
+LEAST_SLIP, MOST_SLIP, MOST_SIDE = -0.1, 0.95, 0.85
+"""What slip of the state can be: on board at most a tenth of W too much is allowed for the angle of attack,
+and a glider does not fly backwards. A compass, or a bent wing, that turns the way by more than a radian (its
+sine) is not thought of."""
+RARE = 0.01
+"""Weight of a mode below which it is left out of the mixture."""
 
 
 @dataclass(frozen=True, slots=True)
 class JointParams:
     """What is known before any dive.
 
-    ``speed``, ``speed_sigma`` of W (m/s) and ``speed_wander`` its usual change in 3 h; ``slip`` the part of
-    the physical slip that is real (on board some is allowed for: a DAC is 5 to 10 % of W off), with
-    ``slip_sigma`` its standard error as part of W, ``side_sigma`` that of side (rad), ``slip_wander`` the
-    change of both in a day; ``own_noise`` the error of W on a dive as part of it; ``front`` (m/s) by how
-    much the flow may change together with a step; ``alarms_per_month`` of the test for a step.
+    ``modes`` are how a dive can be explained; ``speed``, ``speed_sigma`` of W (m/s) and ``speed_wander`` its
+    usual change in 3 h; ``slip`` the part of the physical slip that is real (on board some is allowed for: a
+    DAC is 5 to 10 % of W off), with ``slip_sigma`` its standard error as part of W, ``side_sigma`` that of
+    side (rad), ``slip_memory`` (s) of both; ``own_noise`` the error of W on a dive as part of it; ``front``
+    (m/s) by how much the flow may change together with a step; ``alarms_per_month`` of the test for a step.
     """
 
     flow: FlowParams = FlowParams()
-    surprises: Surprises = Surprises()
+    modes: tuple[Mode, ...] = MODES
     speed: float = 0.35
     speed_sigma: float = 0.2
     speed_wander: float = 0.015
     slip: float = 0.75
-    slip_sigma: float = 0.025
+    slip_sigma: float = 0.018
     side_sigma: float = 0.03
-    slip_wander: float = 0.005
-    own_noise: float = 0.02
+    slip_memory: float = 30 * 86400.0
+    own_noise: float = 0.01
     front: float = 0.25
     alarms_per_month: float = 0.05
 
@@ -65,10 +63,11 @@ class JointParams:
 class JointState:
     """What is known after a dive.
 
-    ``t`` middle of the last dive (s), ``x`` ((n,)) and ``cov`` ((n, n)) of the state; ``sea`` factor on the
+    ``t`` end of the last dive (s), ``x`` ((n,)) and ``cov`` ((n, n)) of the state; ``sea`` factor on the
     variance of the flow's changes and ``doubt`` on that of the measurements, both learnt; ``dives`` used;
     ``bank`` of the test for a step; ``nis`` and ``dof``, sums of the normalised innovations squared and
-    of their degrees of freedom on usual dives; ``end`` the fix that ended the last dive.
+    of their degrees of freedom on usual dives; ``end`` the fix that ended the last dive; ``wrong`` how
+    likely each of its measurements was wrong.
     """
 
     t: float
@@ -81,6 +80,7 @@ class JointState:
     nis: float = 0.0
     dof: int = 0
     end: Fix | None = None
+    wrong: dict[Cause, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,36 +154,53 @@ def step(
         return state, None
     seen = observe(dive)
     if state is None or (state.end is not None and are_apart(state.end, dive.start)):
-        state = init(params, (seen.start + seen.end) / 2)
-    kept, state = _predicted(state, seen, hint, params)
+        state = init(params, seen.start)
+    passage = _passage(state, seen, dive.start.lat, params)
+    state = _predicted(state, seen, passage, params)
+    slipping = Slipping(params.slip * seen.slip, math.sqrt(state.doubt) * params.own_noise, usual)
+    measured = Measured(seen, tells, state.doubt, slipping)
+    steps = _jump(params.flow)
+    shown, jumped = state.cov[-SHOWN:, -SHOWN:], steps[-SHOWN:] @ steps[-SHOWN:].T
+    modes = switched(params.modes, state.wrong)
+    ways = explain(state.x[-SHOWN:], shown, jumped, measured, (*modes, *((ROLLED,) if hint else ())))
+    odds = {
+        str(cause): sum(w.weight for w in ways if w.cause is cause)
+        for cause in dict.fromkeys(w.cause for w in ways)
+    }
+    cause = max(odds, key=lambda each: odds[each])
+    best = max((w for w in ways if str(w.cause) == cause), key=lambda way: way.weight)
     believed = seen.own_speed()
-    about = _about(state, believed)
-    as_expected, as_seen = _measured(state, seen, about, params, usual)
-    own = believed[0] if believed else None
-    told_own = None if tells is None else Told(tells, state.x)
-    found = odds(as_expected, as_seen, state.cov, own, params.surprises, told_own)
-    cause = max(found, key=lambda each: found[each].chance)
-    across = _across(state, seen, about)
-    sea, doubt = _learnt(state, as_seen, cause, across)
-    linear = as_expected if cause.is_error else as_seen
-    after, update = _updated(state, linear, cause, params, found[cause].told)
-    tested = update
-    if cause is Cause.FLOW:
-        # a step that shows at a turn looks like another flow: let the test see it as if it were none
-        _, tested = _updated(state, as_seen, Cause.USUAL, params, found[Cause.USUAL].told)
-    loss, turn, bank = hidden.steps(state.bank, kept, tested, sea, params.front)
-    told = hidden.told(loss, turn, params.alarms_per_month)
-    after = _opened(replace(after, sea=sea, doubt=doubt, bank=bank, end=dive.end), told)
+    across = _across(state, seen, believed)
+    sea, doubt = _learnt(state, passage, best, ways, across)
+    after = _mixed(state, ways, steps)
+    usually = [w for w in ways if w.cause is Cause.USUAL and w.believes == best.believes]
+    tested = _update(state, usually[0] if usually and best.cause is Cause.FLOW else best, steps)
+    loss, turn, bank = hidden.steps(state.bank, passage_matrix(passage), tested, steps, params.front)
+    # where no heading was measured, what looks like a step is a turn that was not seen
+    told = None if seen.is_free else hidden.told(loss, turn, params.alarms_per_month)
+    counts = best.cause is Cause.USUAL
+    after = replace(
+        after,
+        sea=sea,
+        doubt=doubt,
+        bank=bank,
+        end=dive.end,
+        dives=state.dives + 1,
+        wrong={each: odds[str(each)] for each in Cause if each.is_error and str(each) in odds},
+        nis=state.nis + counts * best.square,
+        dof=state.dof + counts * len(best.innovation),
+    )
+    after = _opened(after, told)
     info = JointInfo(
         seen=seen,
-        estimate=_estimate(after, seen, params, usual),
+        estimate=_estimate(after, seen, params, slipping),
         single_sigma=believed[1] * math.sqrt(state.doubt) if believed else math.inf,
         across=across,
-        cause=cause,
-        odds={str(each): odd.chance for each, odd in found.items()},
-        believes=found[cause].told is not None,
-        nis=float(update.innovation @ update.weight @ update.innovation),
-        dof=len(update.innovation),
+        cause=best.cause,
+        odds=odds,
+        believes=best.believes,
+        nis=best.square,
+        dof=len(best.innovation),
         loss=loss,
         turn=turn,
         told=told,
@@ -191,94 +208,121 @@ def step(
     return after, info
 
 
-def _predicted(
-    state: JointState, seen: Observation, hint: bool, params: JointParams
-) -> tuple[Array, JointState]:
-    """The diagonal transition to the middle of a dive, and the state there."""
-    t = (seen.start + seen.end) / 2
-    dt = max(t - state.t, 0.0)
-    kept = np.concatenate([flow.transition(dt, params.flow), np.ones(3)])
-    before = flow.mean_flow(state.t, state.t, params.flow) @ state.x[: params.flow.size]
-    added = np.concatenate(
-        [
-            flow.noise(dt, state.sea, flow.crossing(before, seen.ground, dt, params.flow), params.flow),
-            [params.speed_wander**2 * dt / (3 * flow.HOUR)],
-            np.square([params.slip_wander] * 2) * dt / flow.DAY + np.square([LOST, TURNED]) * hint,
-        ]
-    )
-    cov = kept[:, None] * state.cov * kept + np.diag(added)
-    return kept, replace(state, t=t, x=kept * state.x, cov=cov)
+def _passage(state: JointState, seen: Observation, lat: float, params: JointParams) -> Passage:
+    """What the time from the last dive to the end of this one makes of the flow."""
+    q = flow.intensities(state.x[: params.flow.size], state.sea, params.flow)
+    return flow.passage(max(seen.start - state.t, 0.0), seen.end - seen.start, lat, q, params.flow)
 
 
-def _about(state: JointState, believed: tuple[float, float] | None) -> float:
-    """The own speed (m/s) about which the filter is linear: as seen on the dive, where that can be."""
-    if believed is not None and SLOWEST < believed[0] < FASTEST:
-        return believed[0]
-    return max(float(state.x[OWN]), SLOWEST)
+def passage_matrix(passage: Passage) -> Array:
+    """The transition of the whole state."""
+    n = len(passage.matrix)
+    out = np.eye(n + 3)
+    out[:n, :n] = passage.matrix
+    return out
 
 
-def _measured(
-    state: JointState, seen: Observation, about: float, params: JointParams, usual: float | None
-) -> tuple[Linear, Linear]:
-    """The measurements of a dive, linear about the own speed that was expected, and about the one seen."""
-    as_expected, as_seen = (
-        measure(seen, state.x, _guess(state, seen, own, params, usual), state.doubt, params.flow)
-        for own in (max(float(state.x[OWN]), SLOWEST), about)
-    )
-    return as_expected, as_seen
+@cache
+def _jump(params: FlowParams) -> Array:
+    """What a step of the flow does to the whole state, (n, 2)."""
+    return readonly(np.concatenate([flow.jump(params), np.zeros((3, 2))]))
 
 
-def _guess(
-    state: JointState, seen: Observation, own: float, params: JointParams, usual: float | None
-) -> Guess:
-    """What is known of slip at an own speed (m/s), but for the state's part."""
-    physical = params.slip * seen.slip
-    drag, sigma = drag_slip(own * (1 - physical - float(state.x[SLIP])), usual)
-    return Guess(own, physical + drag, math.hypot(sigma, math.sqrt(state.doubt) * params.own_noise))
+def _predicted(state: JointState, seen: Observation, passage: Passage, params: JointParams) -> JointState:
+    """The state at the end of a dive, before what it measures."""
+    dt = max(seen.end - state.t, 0.0)
+    matrix, n = passage_matrix(passage), params.flow.size
+    fades = math.exp(-dt / params.slip_memory)
+    matrix[[SLIP, SIDE], [SLIP, SIDE]] = fades
+    noise = np.zeros_like(state.cov)
+    noise[:n, :n] = passage.noise
+    kept = np.square([params.slip_sigma, params.side_sigma]) * (1 - fades**2)
+    noise[[OWN, SLIP, SIDE], [OWN, SLIP, SIDE]] = [
+        params.speed_wander**2 * dt / (3 * flow.HOUR),
+        *kept,
+    ]
+    before = state.x[: params.flow.size]
+    crossed = flow.crossing(before[0:2] + before[2:4], seen.ground, dt, params.flow)
+    steps = _jump(params.flow)
+    cov = matrix @ state.cov @ matrix.T + noise + state.sea * crossed**2 * (steps @ steps.T)
+    return replace(state, t=seen.end, x=matrix @ state.x, cov=(cov + cov.T) / 2)
 
 
-def _updated(
-    state: JointState, linear: Linear, cause: Cause, params: JointParams, told: Told | None
-) -> tuple[JointState, Update]:
-    """The state after the measurements of a dive, and W as ``told``, explained by a cause."""
-    size = params.surprises.by_cause()[cause].size
-    if cause is Cause.CURRENT:
-        linear = linear.first(2)  # a current that is wrong is left out, be it as near as it may
-    linear, cov = opened(linear, state.cov, cause, size)
-    if told is not None:
-        linear = linear.with_own(told.x, told.tells)
-    rows, e = linear.rows, linear.innovation
-    weight = np.asarray(np.linalg.inv(rows @ cov @ rows.T + linear.noise), dtype=np.float64)
-    gain = cov @ rows.T @ weight
-    left = np.eye(len(cov)) - gain @ rows
-    after = left @ cov @ left.T + gain @ linear.noise @ gain.T
-    counts = cause is Cause.USUAL
-    state = replace(
-        state,
-        x=readonly(state.x + gain @ e),
-        cov=readonly((after + after.T) / 2),
-        dives=state.dives + 1,
-        nis=state.nis + counts * float(e @ weight @ e),
-        dof=state.dof + counts * len(e),
-    )
-    return state, Update(rows, gain, weight, e)
+def _update(state: JointState, way: Explained, steps: Array) -> Update:
+    """The update of the whole state that one explanation of a dive makes."""
+    turned = _cov(state, way, steps)[:, -SHOWN:] @ way.rows.T
+    rows = np.zeros((len(way.rows), len(state.x)))
+    rows[:, -SHOWN:] = way.rows
+    return Update(rows, turned @ way.weight_matrix, way.weight_matrix, way.innovation)
+
+
+def _cov(state: JointState, way: Explained, steps: Array) -> Array:
+    """The covariance of the whole state with what an explanation opens."""
+    if way.cause is Cause.FLOW:
+        return state.cov + way.size**2 * (steps @ steps.T)
+    if way.cause is Cause.SPEED:
+        cov = state.cov.copy()
+        cov[OWN, OWN] += way.size**2
+        return cov
+    if way.cause is Cause.WING:
+        cov = state.cov.copy()
+        cov[[SLIP, SIDE], [SLIP, SIDE]] += np.square([way.size, way.size / 3])
+        return cov
+    return state.cov
+
+
+def _mixed(state: JointState, ways: list[Explained], steps: Array) -> JointState:
+    """The state after a dive: the mixture of what it is under each explanation."""
+    kept = [way for way in ways if way.weight > RARE]
+    total = sum(way.weight for way in kept)
+    means, covs = [], []
+    for way in kept:
+        update, cov = _update(state, way, steps), _cov(state, way, steps)
+        means.append(state.x + update.gain @ way.innovation)
+        covs.append(cov - update.gain @ (update.rows @ cov))
+    weights = np.array([way.weight / total for way in kept])
+    x = weights @ np.array(means)
+    cov = sum(w * (c + np.outer(m - x, m - x)) for w, c, m in zip(weights.tolist(), covs, means, strict=True))
+    cov = np.asarray(cov)
+    return replace(state, x=readonly(_bounded(x)), cov=readonly((cov + cov.T) / 2))
+
+
+def _bounded(x: Array) -> Array:
+    """The state within what speed, slip and side can be."""
+    x = x.copy()
+    x[OWN] = min(max(x[OWN], 0.0), FASTEST)
+    x[SLIP] = min(max(x[SLIP], LEAST_SLIP), MOST_SLIP)
+    x[SIDE] = min(max(x[SIDE], -MOST_SIDE), MOST_SIDE)
+    return x
 
 
 def _learnt(
-    state: JointState, linear: Linear, cause: Cause, across: tuple[float, float] | None
+    state: JointState,
+    passage: Passage,
+    best: Explained,
+    ways: list[Explained],
+    across: tuple[float, float] | None,
 ) -> tuple[float, float]:
     """The factors on the flow's changes and on the noise of measurements after one more dive."""
-    at = slice(-2, None)  # the current, else the ground velocity: both show the flow
-    square = None
-    if cause in (Cause.USUAL, Cause.FLOW) and state.dives:
-        rows, e = linear.rows[at], linear.innovation[at]
-        s = rows @ state.cov @ rows.T + linear.noise[at, at]
-        square = float(e @ np.linalg.solve(s, e)) / 2
-    aside = None if cause.is_error or across is None else (across[0] / across[1]) ** 2
-    return learn_sea(state.sea, square, state.dives), learn_doubt(state.doubt, aside, state.dives)
+    usual = next((w for w in ways if w.cause is Cause.USUAL and w.believes == best.believes), None)
+    square, share = None, 0.0
+    if usual is not None and best.cause in (Cause.USUAL, Cause.FLOW) and state.dives:
+        at = (
+            slice(2, 4) if len(usual.innovation) > 3 else slice(0, 2)
+        )  # the current, else the ground velocity
+        rows, e = usual.rows[at], usual.innovation[at]
+        s = rows @ state.cov[-SHOWN:, -SHOWN:] @ rows.T + usual.noise[at, at]
+        inverse = np.linalg.inv(s)
+        square = float(e @ inverse @ e) / 2
+        share = float(np.trace(inverse)) / 2 * passage.restless
+    aside = None if best.cause.is_error or across is None else (across[0] / across[1]) ** 2
+    return learn_sea(state.sea, square, share, state.dives), learn_doubt(state.doubt, aside, state.dives)
 
 
-def _across(state: JointState, seen: Observation, about: float) -> tuple[float, float] | None:
+def _across(
+    state: JointState, seen: Observation, believed: tuple[float, float] | None
+) -> tuple[float, float] | None:
+    about = believed[0] if believed is not None and 0 < believed[0] < FASTEST else float(state.x[OWN])
     found = seen.across(about)
     return None if found is None else (found[0], found[1] * math.sqrt(state.doubt))
 
@@ -292,26 +336,26 @@ def _opened(state: JointState, told: Step | None) -> JointState:
         return state
     shift = told.shift
     cov = state.cov + told.cov + np.outer(shift, shift) / 4
-    return replace(state, x=readonly(state.x + shift), cov=readonly(cov), bank=Bank())
+    return replace(state, x=readonly(_bounded(state.x + shift)), cov=readonly(cov), bank=Bank())
 
 
-def _estimate(state: JointState, seen: Observation, params: JointParams, usual: float | None) -> Estimate:
+def _estimate(state: JointState, seen: Observation, params: JointParams, slipping: Slipping) -> Estimate:
     """What the state says of the speed and of the flow on a dive."""
-    x, cov, n = state.x, state.cov, params.flow.size
+    x, cov = state.x, state.cov
     own = float(x[OWN])
-    guess = _guess(state, seen, own, params, usual)
-    slip, side = guess.slip + float(x[SLIP]), float(x[SIDE])
-    slope = np.zeros(n + 3)
+    slips, slip_sigmas = slip_of(x[None, -SHOWN:], slipping)
+    slip, slip_sigma, side = float(slips[0]), float(slip_sigmas[0]), float(x[SIDE])
+    slope = np.zeros(len(x))
     slope[[OWN, SLIP]] = 1 - slip, -own
     new = max(0.0, float(cov[SLIP, SLIP]) - params.slip_sigma**2)
-    rows = flow.mean_flow(seen.start, seen.end, params.flow)
+    mean = params.flow.mean
     return Estimate(
-        speed=math.hypot(own * (1 - slip), own * side),
-        sigma=math.sqrt(float(slope @ cov @ slope) + (own * guess.slip_sigma) ** 2),
+        speed=min(math.hypot(own * (1 - slip), own * side), own),
+        sigma=math.sqrt(float(slope @ cov @ slope) + (own * slip_sigma) ** 2),
         own_speed=own,
         own_sigma=math.sqrt(float(cov[OWN, OWN]) + own**2 * new),
-        flow=readonly(rows @ x[:n]),
-        flow_cov=readonly(rows @ cov[:n, :n] @ rows.T),
+        flow=readonly(x[mean]),
+        flow_cov=readonly(cov[mean, mean]),
         slip=(slip, math.sqrt(float(cov[SLIP, SLIP]))),
         side=(side, math.sqrt(float(cov[SIDE, SIDE]))),
     )

@@ -68,7 +68,7 @@ def step(
     assessment = replace(
         plain,
         flag=None if flag is None else int(flag),
-        speed=found.speed,
+        speed=found.speed if verdict.by_reckoning is None else verdict.by_reckoning[0],
         speed_min=verdict.normal.low,
         speed_max=verdict.normal.high,
         flow_u=flow[0],
@@ -102,7 +102,7 @@ def _numbers(verdict: Verdict, info: JointInfo) -> dict[str, float]:
     """What the joint estimator knows beside speed and flow, for people and rules."""
     found = info.estimate
     out = {
-        "speed_sigma": found.sigma,
+        "speed_sigma": found.sigma if verdict.by_reckoning is None else verdict.by_reckoning[1],
         "own_speed": found.own_speed,
         "slip": found.slip[0],
         "slip_sigma": found.slip[1],

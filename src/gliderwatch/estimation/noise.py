@@ -10,16 +10,17 @@ SEA, DOUBT = (0.1, 40.0), (0.25, 9.0)
 """Bounds of the factors on the variance of the flow's changes and of the measurements."""
 
 
-def learn_sea(factor: float, square: float | None, dives: int) -> float:
+def learn_sea(factor: float, square: float | None, share: float, dives: int) -> float:
     """The factor on the variance of the flow's changes after the ``square`` of one more innovation.
 
-    ``square`` is normalised, 1 on average where the factor is right (None: no innovation); ``dives`` so far.
-    It counts twice, because part of the innovation's variance does not depend on the factor.
+    ``square`` is normalised, 1 on average where the factor is right (None: no innovation); ``share`` of the
+    innovation's variance depends on the factor: where the tides are not known yet it is small, and little is
+    learnt. ``dives`` so far.
 
-    >>> round(learn_sea(1.0, 2.0, dives=4), 3)
+    >>> round(learn_sea(1.0, 2.0, 0.5, dives=4), 3)
     1.2
     """
-    return _within(factor * (1 + 2 * _part(dives) * _excess(square)), SEA)
+    return _within(factor * (1 + 2 * min(2 * share, 1.0) * _part(dives) * _excess(square)), SEA)
 
 
 def learn_doubt(factor: float, square: float | None, dives: int) -> float:

@@ -28,6 +28,14 @@ COMPASS = 0.02
 COMMANDED = 0.08
 """rad: how far the mean of the commanded headings of a dive is from that of measured ones, where only they
 are sent: 0.04 to 0.09 on the four missions that have both (robust standard deviations)."""
+LIKELY, ASSUMED = 0.92, 0.2
+"""Usual length of the mean heading vector of a dive whose headings are not known, and its standard error."""
+STRAIGHT, TURNING = 0.9, 0.5
+"""Length of the mean of the few headings there are, below which it turned, and the standard error then."""
+STEERED = 0.1
+"""The same error where the commanded headings tell the length."""
+SHAPE = 0.03
+"""The same error where the dead-reckoned way tells the length."""
 UNEVEN = 0.05
 """Part of the speed by which dives and climbs differ: matters where the heading differs between them too."""
 UNSEEN = 0.5
@@ -53,7 +61,8 @@ class Observation:
     ``ground_cov`` ((2, 2)) but for what is wrong with the heading; ``heading`` h ((2,)) with covariance
     ``heading_cov`` ((2, 2)); ``current`` c (m/s, (2,), None: not reported) with standard error
     ``current_sigma`` a component; ``slip`` the part of W that an angle of attack takes, by physics;
-    ``unseen`` the part of the flight within gaps between headings.
+    ``unseen`` the part of the flight within gaps between headings. ``is_free``: no heading was measured, so
+    that its direction is that of g - c and nothing is told by what is across.
     """
 
     start: float
@@ -66,6 +75,7 @@ class Observation:
     current_sigma: float
     slip: float
     unseen: float
+    is_free: bool = False
 
     @property
     def steadiness(self) -> float:
@@ -89,7 +99,7 @@ class Observation:
     def across(self, speed: float) -> tuple[float, float] | None:
         """What of g - c is across the heading, left positive, and its standard error (m/s) at that W."""
         rest, length = self.rest, self.steadiness
-        if rest is None or length < 1e-3:
+        if rest is None or length < 1e-3 or self.is_free:
             return None
         aside = np.array([-self.heading[1], self.heading[0]]) / length
         return float(rest @ aside), math.sqrt(float(aside @ self.rest_cov(speed) @ aside))
@@ -110,14 +120,25 @@ def observe(dive: Dive) -> Observation:
     share = dt[flying] / interval
     flown, vectors = float(share.sum()), track.heading[flying]
     current = dive.current
+    ground = track.x[-1] / interval
+    velocities = (np.diff(track.x, axis=0) / np.maximum(dt, 1e-3)[:, None])[flying]
+    vectors, spread = _directed(vectors, velocities, share, dive)
     error = REPORTED if current is None or current.final else PROVISIONAL
     return Observation(
         start=float(track.t[0]),
         end=float(track.t[-1]),
-        ground=readonly(track.x[-1] / interval),
+        ground=readonly(ground),
         ground_cov=readonly((2 * (GPS / interval) ** 2 + ((1 - flown) * SURFACE_FLOW) ** 2) * np.eye(2)),
         heading=readonly(share @ vectors),
-        heading_cov=readonly(_heading_cov(vectors, share, dive, interval)),
+        heading_cov=readonly(
+            (
+                _missing(dive, interval, flown)
+                if _is_free(dive)
+                else _heading_cov(vectors, share, dive, interval)
+            )
+            + spread
+        ),
+        is_free=_is_free(dive),
         current=None if current is None else readonly([current.u, current.v]),
         current_sigma=math.hypot(error, 2 * GPS / interval),
         slip=_slip(dive),
@@ -136,6 +157,52 @@ def are_apart(end: Fix, start: Fix) -> bool:
     return gap > NEW_AFTER or moved > CARRIED * max(gap, 600.0)
 
 
+def _is_free(dive: Dive) -> bool:
+    """Whether the direction of a dive's heading is that which its current leaves."""
+    return dive.current is not None and is_unmeasured(dive)
+
+
+def is_unmeasured(dive: Dive) -> bool:
+    """Whether the headings of a dive are not those of its compass."""
+    known = dive.features
+    return known.heading_reckoned or known.heading_commanded > 0 or known.heading_assumed
+
+
+def _directed(vectors: Array, velocities: Array, share: Array, dive: Dive) -> tuple[Array, Array]:
+    """The heading vectors where none were measured, and what that adds to the covariance of their mean.
+
+    The glider reckons with its compass, so that g - c = W h holds with the heading that nobody sent. Its
+    dead-reckoned way, drawn to the fixes, has the ``velocities`` (m/s, (k, 2)) over ground: less the current
+    these are W times the headings, whatever current the glider had put into its way. With nothing at all the
+    course is taken for that of a leg.
+    """
+    none = np.zeros((2, 2))
+    reckoned, commanded = dive.features.heading_reckoned, dive.features.heading_commanded > 0
+    if not len(vectors) or not is_unmeasured(dive):
+        return vectors, none
+    flown = float(share.sum())
+    if dive.current is None:
+        # the way has the current in it, the course need not be flown as commanded
+        error = COMMANDED if commanded else 0.3 if reckoned else 1.0
+        return vectors, np.asarray((error * flown) ** 2 * np.eye(2))
+    through = velocities - np.array([dive.current.u, dive.current.v])
+    mean = share @ through / flown
+    rest = float(np.hypot(*mean))
+    if rest < 1e-3:
+        return vectors, np.asarray(flown**2 * np.eye(2))
+    along = mean / rest
+    seen = float(np.hypot(*(share @ vectors))) / flown
+    if reckoned:
+        speeds = np.hypot(*through.T)
+        length, error = rest / max(float(share @ speeds) / flown, rest), SHAPE
+    elif commanded:
+        length, error = seen, STEERED if seen > STRAIGHT else TURNING
+    else:
+        length, error = LIKELY * seen, ASSUMED if seen > STRAIGHT else TURNING
+    error *= flown
+    return np.tile(length * along, (len(vectors), 1)), np.asarray(error**2 * np.outer(along, along))
+
+
 def _heading_cov(vectors: Array, share: Array, dive: Dive, interval: float) -> Array:
     """Covariance of the mean heading vector: few samples, compass, uneven speed, hours not seen.
 
@@ -149,12 +216,18 @@ def _heading_cov(vectors: Array, share: Array, dive: Dive, interval: float) -> A
     steps = np.diff(vectors, axis=0)
     swings = 2 * (steps.T @ steps + CONTROL**2 * np.eye(2)) / (len(steps) + 1)
     aside = np.array([-mean[1], mean[0]])
-    off = math.hypot(COMPASS, COMMANDED * dive.features.heading_commanded)
-    turned = (off * flown) ** 2 * np.outer(aside, aside)
+    turned = (COMPASS * flown) ** 2 * np.outer(aside, aside)
     uneven = (UNEVEN * flown) ** 2 * max(0.0, 1 - float(mean @ mean)) / 2
-    # by way of hours, which keeps the last bit of every estimate of the missions on record
+    return np.asarray(
+        swings * float(share @ share) + turned + uneven * np.eye(2) + _missing(dive, interval, 0.0)
+    )
+
+
+def _missing(dive: Dive, interval: float, flown: float) -> Array:
+    """Covariance of the mean heading vector by hours of which no data came, and by the compass on a part
+    ``flown``."""
     missing = UNSEEN * (dive.features.unobserved / 3600) * 3600 / interval
-    return np.asarray(swings * float(share @ share) + turned + (uneven + missing**2) * np.eye(2))
+    return np.asarray((missing**2 + (COMPASS * flown) ** 2) * np.eye(2))
 
 
 def _slip(dive: Dive) -> float:

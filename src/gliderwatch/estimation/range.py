@@ -13,7 +13,7 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from gliderwatch.estimation.causes import FASTEST
+from gliderwatch.estimation.measurement import FASTEST
 from gliderwatch.estimation.reckoned import MAD_TO_SIGMA
 from gliderwatch.model import Array, DiveFeatures, readonly
 
@@ -74,6 +74,14 @@ def learn(
     if is_trial or int(_alike(normal, at).sum()) >= params.most:
         return normal
     return Normal(readonly([*normal.speeds, speed]), readonly([*normal.settings, at]))
+
+
+def renewed(normal: Normal, speeds: tuple[float, ...], at: float) -> Normal:
+    """The healthy dives where those at a setting are now these alone: the glider is flown in a new way."""
+    kept = ~_alike(normal, at)
+    return Normal(
+        readonly([*normal.speeds[kept], *speeds]), readonly([*normal.settings[kept], *([at] * len(speeds))])
+    )
 
 
 def speed_range(normal: Normal, at: float, params: RangeParams) -> SpeedRange | None:

@@ -16,7 +16,7 @@ from gliderwatch.estimation import joint
 from gliderwatch.estimation.causes import Cause
 from gliderwatch.estimation.joint import JointInfo, JointParams, JointState
 from gliderwatch.estimation.observation import USUAL_PITCH, are_apart, slip_at
-from gliderwatch.estimation.range import Normal, RangeParams, SpeedRange, learn, setting, speed_range
+from gliderwatch.estimation.range import Normal, RangeParams, SpeedRange, learn, renewed, setting, speed_range
 from gliderwatch.estimation.reckoned import Ratios, Reckoned, reckon
 from gliderwatch.estimation.reckoned import learn as learn_ratios
 from gliderwatch.model import Dive, Flag
@@ -28,10 +28,26 @@ DEPARTURE, SLACK = 0.08, 1.0
 and how many times that does not add to the sum."""
 OWN_SURE = 0.15
 """Standard error of W on a dive, as part of it, up to which the dive tells what W is to what is reported."""
-NOT_FLOWN = "the way does not fit the commanded heading, and the measured one is not in the file"
+NOT_SEEN = "it turned, and its heading is not in the file: the speed cannot be told"
+ROLL_CONFIRMS = 0.67
+"""Standard errors by which a speed must be below normal where the glider rolls otherwise for two dives:
+three to one."""
+FASTER = "faster than ever: the current is wrong, or it is driven harder"
+NEW_FASTER = "faster than before: a new way of flying, or the current is wrong: the next dives will tell"
+NEW_SLOWER = "slower than before, after a change of pitch or ballast: the next dives will tell"
+HIDDEN = 0.1
+"""Part of the speed that the glider believes, by which it must be slower to be slower than that."""
 ROLLED, ROLLS = 0.12, 5
 """rad: a step of the mean roll that speaks for a lost or bent wing; dives that tell the usual roll, and
 samples that tell the roll of a dive."""
+Trim = tuple[float | None, ...]
+"""What a pilot chooses of a dive: pitch diving and climbing (rad), volume pumped diving and climbing (m3)."""
+AGREE, ENOUGH = 0.12, 3
+"""Part of it by which speeds of a new way of flying differ at most, and dives in a row that make it one."""
+EXPLAINED = 0.7
+"""Part of the usual speed that is left at least after a change of trim: pitch and ballast take no more."""
+RETRIMMED = (0.08, 0.08, 30e-6, 30e-6)
+"""Change of each number of the trim that was the pilot's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +79,8 @@ class SpeedState:
     ``joint`` estimate (None: no dive yet), ``normal`` speeds learnt, ``rolls`` (rad) of the first healthy
     dives, ``rolled`` dives in a row that roll otherwise, ``slow`` Page's sum of small losses, ``doubted``
     slow dives in a row that were not believed, ``misfits`` of the last dives, ``ratios`` of the speed to
-    what the glider tells of it.
+    what the glider tells of it; ``trim`` of the last normal dive, ``other`` speeds (m/s) of the last dives
+    in a row that may be a new way of flying.
     """
 
     joint: JointState | None = None
@@ -74,17 +91,21 @@ class SpeedState:
     doubted: int = 0
     misfits: tuple[Misfit, ...] = ()
     ratios: Ratios = Ratios()
+    trim: Trim = ()
+    other: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
     """What a dive says: ``flag`` (None: nothing) with the ``reason`` in words, the ``normal`` range used, and
-    what was found (``info``, None: the dive has no track)."""
+    what was found (``info``, None: the dive has no track). ``by_reckoning``: the speed through the water
+    (m/s) and its standard error by depth rate and pitch, where these alone decided."""
 
     flag: Flag | None
     reason: str
     normal: SpeedRange
     info: JointInfo | None
+    by_reckoning: tuple[float, float] | None = None
 
 
 def step(
@@ -109,13 +130,69 @@ def step(
         return state, Verdict(flag, reason, normal, None)
     state = replace(state, joint=estimate, rolled=rolled, misfits=_misfits(state, info))
     flag, reason = _wrong(state, info, params)
-    if flag is not None and info.cause is not Cause.CURRENT and dive.features.heading_commanded:
-        flag, reason = None, NOT_FLOWN  # nothing is wrong that is measured
     if flag is None and not reason:
         state, flag, reason = _slow_or_fast(state, info, told, normal, params)
+    # a course that was not steady looks slow: where no heading is known at all depth rate and pitch decide
+    assumed = flag is Flag.ANOMALY and dive.features.heading_assumed and told is not None
+    if (flag is None and info.seen.is_free) or assumed:
+        reason = NOT_SEEN if assumed else reason
+        flag, reason = _by_reckoning(reason, state, told, normal, params)
+        if flag is not None and told is not None:
+            left = 1 - _usual_slip(params)
+            return state, Verdict(flag, reason, normal, info, (told.speed * left, told.sigma * left))
+    state, flag, reason, normal = _regime(state, dive, info, told, normal, flag, reason, params)
     if flag is Flag.NORMAL and not frozen:
-        state = _learnt(state, dive, info, at, params)
+        state = replace(_learnt(state, dive, info, at, params), trim=_trim(dive))
     return state, Verdict(flag, reason, normal, info)
+
+
+def _regime(
+    state: SpeedState,
+    dive: Dive,
+    info: JointInfo,
+    told: Reckoned | None,
+    normal: SpeedRange,
+    flag: Flag | None,
+    reason: str,
+    params: SpeedParams,
+) -> tuple[SpeedState, Flag | None, str, SpeedRange]:
+    """What is said of a dive out of its range that may be flown in a new way, and the state with that.
+
+    A faster glider is no fault: three dives at one speed, which depth rate and pitch do not deny, are a new
+    way of flying with a range of its own. A slower one is that only where the pilot changed pitch or ballast.
+    """
+    speed, learning = info.estimate.speed, params.learning
+    faster = reason == FASTER
+    explained = speed > EXPLAINED * normal.usual and retrimmed(state.trim, _trim(dive))
+    slower = flag is Flag.ANOMALY and explained and told is not None and info.believes
+    if learning is None or not normal.dives or not (faster or slower):
+        return (replace(state, other=()) if state.other else state), flag, reason, normal
+    if faster and told is not None and not info.believes:
+        return replace(state, other=()), flag, reason, normal
+    row = (*(each for each in state.other if abs(each / speed - 1) < AGREE), speed)
+    if len(row) < ENOUGH:
+        return replace(state, other=row), None, NEW_FASTER if faster else NEW_SLOWER, normal
+    at = setting(dive.features)
+    state = replace(state, normal=renewed(state.normal, row, at), other=(), slow=0.0, doubted=0)
+    new = speed_range(state.normal, at, learning) or normal
+    words = f"flies in a new way for three dives: {speed:.2f} m/s is its normal speed now, "
+    words += "unless you say otherwise"
+    return state, Flag.NORMAL, words, new
+
+
+def _trim(dive: Dive) -> Trim:
+    f = dive.features
+    return (f.pitch_dive, f.pitch_climb, f.ballast_dive, f.ballast_climb)
+
+
+def retrimmed(before: Trim, now: Trim) -> bool:
+    """Whether the pilot changed pitch or ballast between two dives.
+
+    >>> retrimmed((-0.45, 0.45, None, None), (-0.35, 0.36, None, None)), retrimmed((), (-0.45, 0.45, None,
+    None)) (True, False)
+    """
+    pairs = zip(before, now, RETRIMMED, strict=False)
+    return any(a is not None and b is not None and abs(a - b) > least for a, b, least in pairs)
 
 
 def _misfits(state: SpeedState, info: JointInfo) -> tuple[Misfit, ...]:
@@ -132,13 +209,11 @@ def _wrong(state: SpeedState, info: JointInfo, params: SpeedParams) -> tuple[Fla
         return None, "no depth-averaged current"
     if info.across is not None and disagrees(state.misfits[-1], params.gate, params.least):
         return Flag.FALSE_ALARM, str(blame(state.misfits, params.gate, params.least))
-    if info.cause is Cause.CURRENT:
-        return Flag.FALSE_ALARM, "the current does not fit those before, the ground velocity does"
-    if info.cause is Cause.GROUND:
-        return (
-            Flag.FALSE_ALARM,
-            "the ground velocity does not fit, the current does: fixes or headings are wrong",
-        )
+    if info.cause is Cause.GROUND and info.seen.is_free:
+        return None, NOT_SEEN
+    words = next((mode.words for mode in params.joint.modes if mode.cause is info.cause and mode.words), "")
+    if words:
+        return Flag.FALSE_ALARM, words
     side, sigma = info.estimate.side
     if abs(side) > max(params.turned, 3 * sigma):
         return Flag.FALSE_ALARM, f"the compass seems to be off by {degrees(abs(side)):.0f} degrees"
@@ -149,12 +224,22 @@ def _of_reckoning_alone(
     state: SpeedState, dive: Dive, told: Reckoned | None, normal: SpeedRange, params: SpeedParams
 ) -> tuple[Flag | None, str]:
     """Flag 1 where a dive without track is slow by what the glider tells at once; else its reason."""
+    return _by_reckoning(dive.reason, state, told, normal, params)
+
+
+def _by_reckoning(
+    why: str, state: SpeedState, told: Reckoned | None, normal: SpeedRange, params: SpeedParams
+) -> tuple[Flag | None, str]:
+    """The flag that depth rate and pitch alone give, where the way says nothing because of ``why``."""
     if told is None or not told.is_prompt or state.joint is None or not normal.dives:
-        return None, dive.reason
+        return None, why
     # no course that was steered can look like this: the bound is wide because nothing else confirms it
-    if (told.speed + 2 * params.confidence * told.sigma) * (1 - _usual_slip(params)) < normal.low:
-        return Flag.ANOMALY, f"slower than normal by depth rate and pitch alone ({dive.reason})"
-    return None, dive.reason
+    left, sigma = 1 - _usual_slip(params), params.confidence * told.sigma
+    if (told.speed + 2 * sigma) * left < normal.low:
+        return Flag.ANOMALY, f"slower than normal by depth rate and pitch alone ({why})"
+    if (told.speed - sigma / 2) * left > normal.low:
+        return Flag.NORMAL, f"as fast as usual by depth rate and pitch alone ({why})"
+    return None, why
 
 
 def _slow_or_fast(
@@ -166,16 +251,19 @@ def _slow_or_fast(
     if sigma_own > params.vague * normal.usual:
         return state, None, "the speed cannot be known: the glider turned too much"
     # what is common to all dives is also in a range that was learnt from them
-    sigma = params.confidence * (info.estimate.own_sigma if normal.dives else info.estimate.sigma)
+    sigma = info.estimate.own_sigma if normal.dives else info.estimate.sigma
+    sigma *= ROLL_CONFIRMS if state.rolled > 1 else params.confidence
     if info.estimate.speed + sigma < normal.low:
-        if not state.doubted and believed is None and _may_have_turned(info, normal):
+        # depth rate and pitch would be slow as well; where they are not sent a second dive has to be slow
+        unseen = info.seen.is_free and (told is not None or not state.doubted)
+        if believed is None and (unseen or (not state.doubted and _may_have_turned(info, normal))):
             reason = "slow, or it turned while its heading was not seen: the next dive will tell"
             return replace(state, doubted=1), None, reason
         return state, Flag.ANOMALY, _how_slow(info, normal, params)
     state = replace(state, doubted=0)
     if info.estimate.speed - sigma > normal.high:
         if normal.dives:
-            return state, Flag.FALSE_ALARM, "faster than ever: the current is wrong, or it is driven harder"
+            return state, Flag.FALSE_ALARM, FASTER
         return state, Flag.ANOMALY, "faster than normal"
     return _small_losses(state, info, normal, params)
 
@@ -195,22 +283,30 @@ def _small_losses(
     state: SpeedState, info: JointInfo, normal: SpeedRange, params: SpeedParams
 ) -> tuple[SpeedState, Flag, str]:
     """Flag 1 where a loss too small for one dive has gone on for several; the state with the sum of it."""
-    if not normal.dives:
+    if not normal.dives or (info.seen.is_free and not info.believes):
         return state, Flag.NORMAL, ""
     bound = cusum_bound(SLACK, DIVES_A_MONTH / params.joint.alarms_per_month)
-    total = cusum(state.slow, (1 - info.estimate.speed / normal.usual) / DEPARTURE, SLACK)
-    state = replace(state, slow=min(total, 2 * bound))
+    found = info.estimate
+    # a dive that hardly tells the speed adds little, and no dive alone is several
+    departure = (1 - found.speed / normal.usual) / max(DEPARTURE, found.own_sigma / normal.usual)
+    total = min(cusum(state.slow, min(departure, bound / 2 + SLACK), SLACK), bound + SLACK)
+    if departure < SLACK / 2:
+        total /= 2  # it flies as usual: what was slow is over soon
+    state = replace(state, slow=total)
     if total > bound:
-        return state, Flag.ANOMALY, "a little slow for several dives"
+        return state, Flag.ANOMALY, _how_slow(info, normal, params, "a little slow for several dives")
     return state, Flag.NORMAL, ""
 
 
-def _how_slow(info: JointInfo, normal: SpeedRange, params: SpeedParams) -> str:
-    """Words for a speed below normal."""
+def _how_slow(
+    info: JointInfo, normal: SpeedRange, params: SpeedParams, words: str = "slower than normal"
+) -> str:
+    """Words for a speed below normal: that of the glider itself is, or it does not know of it."""
     believed = info.estimate.own_speed * (1 - params.joint.slip * info.seen.slip)
-    if believed >= normal.low:
+    hidden = believed - info.estimate.speed > HIDDEN * believed
+    if hidden and believed >= (normal.low + normal.usual) / 2:
         return "slower through the water than the glider itself believes: a wing may be lost or bent"
-    return "slower than normal"
+    return words
 
 
 def _rolls(state: SpeedState, dive: Dive) -> bool:
@@ -227,7 +323,7 @@ def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: S
     if roll is not None and len(state.rolls) < 3 * ROLLS:
         state = replace(state, rolls=(*state.rolls, roll))
     own = info.seen.own_speed()
-    if own is not None and own[1] < OWN_SURE * own[0]:
+    if own is not None and own[1] < (2 if info.seen.is_free else 1) * OWN_SURE * own[0]:
         state = replace(state, ratios=learn_ratios(state.ratios, dive.features, own[0]))
     if params.learning is None or info.told is not None:
         return state

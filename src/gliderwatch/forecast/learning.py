@@ -9,25 +9,27 @@ import numpy as np
 
 from gliderwatch.estimation.observation import are_apart
 from gliderwatch.forecast import timing
-from gliderwatch.forecast.state import CHI2, Place, Surfacings, bearing, factor, is_same, plan
+from gliderwatch.forecast.constants import (
+    CHI2_COVERED,
+    DIVE_MEMORY,
+    DRIFT_GAIN,
+    FASTEST,
+    FASTEST_DRIFT,
+    HABIT_DIVES,
+    INTERVALS_KEPT,
+    LONG_DRIFT,
+    MISSES_KEPT,
+    SLOWEST,
+    STEADY_HEADING,
+    UNSEEN,
+    WAYPOINTS_KEPT,
+    WILD_CHANGE,
+    WORST_COURSE,
+)
+from gliderwatch.forecast.state import Place, Surfacings, bearing, factor, is_same, plan
 from gliderwatch.forecast.steering import courses
 from gliderwatch.model import Array, Dive, Expected, Fix, Unusable
 from gliderwatch.navigation.frame import way
-
-FEW, MANY, HELD = 5, 30, 16
-"""Dives that tell habits, dives that tell errors, and waypoints of the past that are remembered."""
-MEMORY, WORST = 0.8, 2.0
-"""What is left of the score of a way of steering after each further dive; greatest square that counts."""
-CALM = 0.1
-"""Weight of the latest drift at the surface, and of `LONG_DRIFT` at least (s)."""
-LONG_DRIFT, FASTEST_DRIFT = 300.0, 1.0
-"""Seconds between two fixes that tell a drift; m/s beside the current that it is at most."""
-STEADY = 0.3
-"""Length of the mean heading vector from which the speed of a dive shows."""
-SLOWEST, FASTEST = 0.05, 1.5
-"""Bounds of the speed (m/s) that a glider believes."""
-UNSEEN = 1800.0
-"""s without data in which a glider may have been up."""
 
 
 def learn(
@@ -83,9 +85,9 @@ def _timed(state: Surfacings, dive: Dive, end: Fix) -> Surfacings:
         errors = (*errors, timing.error(interval, timing.usual(state.intervals)))
     return replace(
         known,
-        intervals=(*state.intervals, interval)[-timing.KEPT :],
-        errors=errors[-MANY:],
-        surface=(*state.surface, max(dive.t_dive - state.fix.t, 0.0))[-FEW:],
+        intervals=(*state.intervals, interval)[-INTERVALS_KEPT:],
+        errors=errors[-MISSES_KEPT:],
+        surface=(*state.surface, max(dive.t_dive - state.fix.t, 0.0))[-HABIT_DIVES:],
     )
 
 
@@ -101,8 +103,8 @@ def _scores(state: Surfacings, dive: Dive, end: Fix) -> tuple[float, ...]:
     really = (over_ground - met) / speed
     made, scores = courses(plan(state, speed, known), max(end.t - state.fix.t, 1.0)), []
     for score, course in zip(state.scores, made, strict=True):
-        part = (1 - MEMORY) * (1 - course.unknown)
-        square = min(float(np.sum((course.heading - really) ** 2)), WORST)
+        part = (1 - DIVE_MEMORY) * (1 - course.unknown)
+        square = min(float(np.sum((course.heading - really) ** 2)), WORST_COURSE)
         scores.append((1 - part) * score + part * square)
     return tuple(scores)
 
@@ -115,14 +117,14 @@ def _misses(state: Surfacings, dive: Dive, end: Fix, expected: Expected | None) 
         return state.misses
     off = way(end.lat, end.lon, expected.lat, expected.lon)
     cov = np.array([[expected.east, expected.cross], [expected.cross, expected.north]])
-    distance = math.sqrt(float(off @ np.linalg.solve(cov, off)) / CHI2) * factor(state.misses)
-    return (*state.misses, distance)[-MANY:]
+    distance = math.sqrt(float(off @ np.linalg.solve(cov, off)) / CHI2_COVERED) * factor(state.misses)
+    return (*state.misses, distance)[-MISSES_KEPT:]
 
 
 def _waypoints(known: tuple[Place, ...], told: Place | None) -> tuple[Place, ...]:
     if told is None or (known and is_same(known[-1], told)):
         return known
-    return (*known, told)[-HELD:]
+    return (*known, told)[-WAYPOINTS_KEPT:]
 
 
 def _flown(state: Surfacings, dive: Dive) -> Surfacings:
@@ -131,7 +133,9 @@ def _flown(state: Surfacings, dive: Dive) -> Surfacings:
         return state
     dt = np.diff(dive.track.t)
     east, north = (dt @ dive.track.heading / dt.sum()).tolist()
-    return replace(state, heading=(east, north), lengths=(*state.lengths, math.hypot(east, north))[-FEW:])
+    return replace(
+        state, heading=(east, north), lengths=(*state.lengths, math.hypot(east, north))[-HABIT_DIVES:]
+    )
 
 
 def _adrift(state: Surfacings, before: Fix | None, dive: Dive) -> Surfacings:
@@ -143,7 +147,9 @@ def _adrift(state: Surfacings, before: Fix | None, dive: Dive) -> Surfacings:
         return state
     moved = way(dive.start.lat, dive.start.lon, before.lat, before.lon)
     beside = moved / time - state.current  # that of the dive before
-    east, north = (1 - CALM) * np.array(state.drift) + CALM * np.clip(beside, -FASTEST_DRIFT, FASTEST_DRIFT)
+    east, north = (1 - DRIFT_GAIN) * np.array(state.drift) + DRIFT_GAIN * np.clip(
+        beside, -FASTEST_DRIFT, FASTEST_DRIFT
+    )
     return replace(state, drift=(float(east), float(north)))
 
 
@@ -154,10 +160,10 @@ def _driven(state: Surfacings, dive: Dive) -> Surfacings:
     current, change = (dive.current.u, dive.current.v), state.change
     if state.current is not None:
         square = math.dist(current, state.current) ** 2 / 2
-        change = MEMORY * change + (1 - MEMORY) * min(square, 9 * change)
+        change = DIVE_MEMORY * change + (1 - DIVE_MEMORY) * min(square, WILD_CHANGE * change)
     state = replace(state, current=current, change=change)
     over_ground, heading = ground(dive), np.array(state.heading or (0.0, 0.0))
-    if dive.track is None or over_ground is None or np.hypot(*heading) < STEADY:
+    if dive.track is None or over_ground is None or np.hypot(*heading) < STEADY_HEADING:
         return state
     own = float((over_ground - current) @ heading / (heading @ heading))
     return replace(state, speed=min(max(own, SLOWEST), FASTEST))

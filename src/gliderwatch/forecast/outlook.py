@@ -12,17 +12,14 @@ from gliderwatch.estimation.glider import Estimate
 from gliderwatch.estimation.joint import JointParams, JointState
 from gliderwatch.estimation.measurement import OWN, SLIP
 from gliderwatch.estimation.observation import DRAG_BY_LIFT, USUAL_PITCH
+from gliderwatch.forecast.constants import VAGUE
 from gliderwatch.forecast.surfacing import Flow
 from gliderwatch.model import Array
 
 Outlook = tuple[float, float, Flow]
 """Speed through the water and its standard error (m/s), and the forecast of the flow."""
-VAGUE = 0.1
-"""Part of the speed: its error where an estimator gives none."""
 PHYSICAL = JointParams().slip * DRAG_BY_LIFT / sin(USUAL_PITCH) ** 2
 """Part of the own speed that the angle of attack takes at the usual pitch, beside the slip of the state."""
-PASSING, MEMORY = 0.08, 30 * 3600.0
-"""Size (m/s, a component) and time constant (s) of what changes of a current from dive to dive."""
 
 
 def look_ahead(estimate: Estimate, over_ground: Array | None) -> Outlook | None:
@@ -35,11 +32,12 @@ def look_ahead(estimate: Estimate, over_ground: Array | None) -> Outlook | None:
         return _of_joint(joint, np.zeros(2) if over_ground is None else over_ground)
     if learner.learner is None or learner.current is None:
         return None
+    params = FlowParams()
     current, t = np.array([learner.current.u, learner.current.v]), learner.current_t
 
     def flow(start: float, end: float) -> tuple[Array, Array]:
-        left = max((start + end) / 2 - t, 0.0) / MEMORY
-        return current, -(PASSING**2) * expm1(-2 * left) * np.eye(2)
+        left = max((start + end) / 2 - t, 0.0) / params.memory
+        return current, -(params.passing**2) * expm1(-2 * left) * np.eye(2)
 
     speed = learner.learner.speed
     return speed, VAGUE * abs(speed), flow

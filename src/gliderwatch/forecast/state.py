@@ -8,6 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gliderwatch.forecast.constants import (
+    CURRENT_CHANGE,
+    DOUBT,
+    FIRST_MISSES,
+    FIRST_MISSES_WEIGHT,
+    MISSES_MEMORY,
+    MOST_STRETCH,
+    SAME_WAYPOINT,
+)
 from gliderwatch.forecast.steering import WAYS, Plan
 from gliderwatch.forecast.timing import quantile
 from gliderwatch.model import Array, Fix
@@ -17,22 +26,6 @@ Place = tuple[float, float]
 """Latitude and longitude (degrees)."""
 Vector = tuple[float, float]
 """East and north."""
-
-DOUBT = 0.1
-"""Mean square error of a course before any dive, in parts of the speed squared."""
-CHANGE = 0.06
-"""m/s, a component: by how much a current differs from the one before, before it is known."""
-MISSES, MISSES_WEIGHT, MISSES_MEMORY = (0.3, 0.5, 0.7, 0.9, 1.2), 0.4, 0.95
-"""Distances from the place expected (parts of the 95 % ellipse) that stand for those of missions in general,
-the weight of each, and what is left of the weight of one made after each further dive."""
-LEAST, MOST = 0.4, 4.0
-"""Bounds of the factor on the axes of the ellipse."""
-CHI2 = 5.991
-"""95 % of squared distances in a plane, in standard errors, are below this."""
-NEAR = 200.0
-"""Metres: waypoints nearer than this are the same one, told with other decimals."""
-FAR = 0.01
-"""Degrees of latitude that are more than that for sure."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +51,7 @@ class Surfacings:
     lengths: tuple[float, ...] = ()
     speed: float | None = None
     current: Vector | None = None
-    change: float = CHANGE**2
+    change: float = CURRENT_CHANGE**2
     bearing: float | None = None
     waypoints: tuple[Place, ...] = ()
     scores: tuple[float, ...] = (DOUBT,) * len(WAYS)
@@ -71,7 +64,7 @@ def is_same(a: Place, b: Place) -> bool:
     >>> is_same((38.3892, -73.5), (38.389, -73.5)), is_same((38.38, -73.5), (38.389, -73.5))
     (True, False)
     """
-    return abs(a[0] - b[0]) < FAR and (a == b or float(np.hypot(*way(*a, *b))) < NEAR)
+    return a == b or float(np.hypot(*way(*a, *b))) < SAME_WAYPOINT
 
 
 def goals(state: Surfacings) -> tuple[Array, ...]:
@@ -100,5 +93,5 @@ def factor(misses: Sequence[float]) -> float:
 
     ``misses`` are the distances from the places expected, in parts of the ellipse as reckoned.
     """
-    found = quantile(misses, MISSES, MISSES_WEIGHT, MISSES_MEMORY)
-    return min(max(found, LEAST), MOST)
+    found = quantile(misses, FIRST_MISSES, FIRST_MISSES_WEIGHT, MISSES_MEMORY)
+    return min(found, MOST_STRETCH)

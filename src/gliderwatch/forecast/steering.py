@@ -11,14 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gliderwatch.forecast.constants import MOST_ALLOWANCE, SLOWEST
 from gliderwatch.model import Array
 
 WAYS = ("as before", "beside the waypoint", "at the waypoint", "at the waypoint against the current")
 """The ways of steering, in the order of what is told of them."""
-MOST = 0.8
-"""Sine of the angle that allowance for a current takes at most."""
-SLOWEST = 0.05
-"""m/s: a glider is not slower than this where it plans its way."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,4 +84,4 @@ def _allowance(plan: Plan, along: Array) -> float:
     -0.5236
     """
     left = float(along[0] * plan.current[1] - along[1] * plan.current[0])
-    return math.asin(min(max(left / max(plan.speed, SLOWEST), -MOST), MOST))
+    return math.asin(min(max(left / max(plan.speed, SLOWEST), -MOST_ALLOWANCE), MOST_ALLOWANCE))

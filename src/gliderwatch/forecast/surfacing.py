@@ -18,9 +18,18 @@ from statistics import median
 import numpy as np
 
 from gliderwatch.forecast import timing
+from gliderwatch.forecast.constants import (
+    ALIKE,
+    COMMUNICATION,
+    FLOORS,
+    GPS_ERROR,
+    INTERVALS_KEPT,
+    MOST_AT_SURFACE,
+    SLOWEST,
+)
 from gliderwatch.forecast.learning import learn
 from gliderwatch.forecast.state import Surfacings, factor, plan
-from gliderwatch.forecast.steering import SLOWEST, WAYS, courses
+from gliderwatch.forecast.steering import WAYS, courses
 from gliderwatch.model import Array, Expected
 from gliderwatch.navigation.frame import from_plane
 
@@ -28,16 +37,6 @@ __all__ = ["Flow", "Surfacings", "expect", "learn"]
 
 Flow = Callable[[float, float], tuple[Array, Array]]
 """Mean flow (m/s, (2,): east, north) between two times (s), and its covariance (m2/s2, (2, 2))."""
-
-COMMUNICATION = 900.0
-"""Seconds at the surface before they are known."""
-GPS = 10.0
-"""Metres, a component: error of the way between two fixes."""
-ALIKE = 0.5
-"""Correlation of the errors of a forecast of the flow and of the last current taken for one."""
-FLOORS = (0.03, 0.01, 0.01, 0.01)
-"""Added to the scores of the ways of steering, so that none is taken for perfect; where all were alike, as on
-a straight way, a glider is rather expected to follow its waypoint than to go on as before."""
 
 
 def expect(
@@ -53,7 +52,7 @@ def expect(
         return None
     interval, why = _interval(state, surfacing_hours)
     t_sigma = interval * timing.spread(state.errors)
-    at_surface = min(median(state.surface) if state.surface else COMMUNICATION, interval / 2)
+    at_surface = min(median(state.surface) if state.surface else COMMUNICATION, MOST_AT_SURFACE * interval)
     dive = interval - at_surface
     water, water_cov, share = _water(state, *flow(fix.t, fix.t + interval))
     # the last current is what the glider's own speed left of its way: the two belong together
@@ -65,7 +64,7 @@ def expect(
         interval**2 * water_cov
         + dive**2 * (speed_sigma**2 * np.outer(heading, heading) + own**2 * heading_cov)
         + t_sigma**2 * np.outer(over_ground, over_ground)
-        + GPS**2 * np.eye(2)
+        + GPS_ERROR**2 * np.eye(2)
     )
     lat, lon = from_plane(displacement, fix.lat, fix.lon)
     return Expected(
@@ -85,7 +84,7 @@ def _interval(state: Surfacings, hours: float | None) -> tuple[float, str]:
     """The next interval (s), and what it rests on."""
     if hours is None and not state.intervals:
         return state.duration + COMMUNICATION, "as long as the first dive"
-    missing = timing.KEPT - len(state.intervals) if hours is not None else 0
+    missing = INTERVALS_KEPT - len(state.intervals) if hours is not None else 0
     configured = (hours * 3600,) * missing if hours is not None else ()
     why = "as configured" if not state.intervals else "as configured and before" if missing else "as before"
     return timing.usual((*configured, *state.intervals)), why

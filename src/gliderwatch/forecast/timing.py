@@ -11,19 +11,17 @@ import math
 from collections.abc import Sequence
 from statistics import median
 
-KEPT = 4
-"""Intervals that count for the next."""
-MEMORY = 0.92
-"""What is left of the weight of an error after each further dive."""
-FIRST_ERRORS = (0.01, 0.02, 0.04, 0.12, 0.6)
-"""Errors (logarithm of a ratio) that stand for those of missions in general, and their weight each."""
-FIRST_WEIGHT = 0.2
-LONGEST_ERROR = 1.0
-"""An error above this counts as this much."""
-FEW = 1.1
-"""By how much a quantile of few errors is too small, about."""
-OFTEN = 0.95
-"""Part of errors within 1.96 standard errors."""
+from gliderwatch.forecast.constants import (
+    COVERED,
+    ERROR_MEMORY,
+    FEW_ERRORS,
+    FIRST_ERRORS,
+    FIRST_WEIGHT,
+    INTERVALS_KEPT,
+    LATEST_AGAIN,
+    LONGEST_ERROR,
+    NORMAL_COVERED,
+)
 
 
 def usual(intervals: Sequence[float]) -> float:
@@ -35,12 +33,12 @@ def usual(intervals: Sequence[float]) -> float:
     >>> usual([100.0, 101.0, 99.0, 200.0]), usual([101.0, 99.0, 200.0, 202.0])
     (150.5, 201.0)
     """
-    last = list(intervals[-KEPT:])
-    return median([last[-1]] * 2 + last)
+    last = list(intervals[-INTERVALS_KEPT:])
+    return median([last[-1]] * LATEST_AGAIN + last)
 
 
 def quantile(errors: Sequence[float], usual_ones: Sequence[float], weight: float, memory: float) -> float:
-    """The value below which `OFTEN` of errors are: of those made, the latest last, and of usual ones.
+    """The value below which `COVERED` of errors are: of those made, the latest last, and of usual ones.
 
     Errors lose weight with age by ``memory`` a dive; ``weight`` is that of each usual one.
 
@@ -51,7 +49,7 @@ def quantile(errors: Sequence[float], usual_ones: Sequence[float], weight: float
     """
     weights = [memory**age for age in reversed(range(len(errors)))] + [weight] * len(usual_ones)
     pairs = sorted(zip([*errors, *usual_ones], weights, strict=True))
-    left = (1 - OFTEN) * sum(weights)
+    left = (1 - COVERED) * sum(weights)
     for value, share in reversed(pairs):
         left -= share
         if left < 0:
@@ -66,4 +64,4 @@ def error(interval: float, expected: float) -> float:
 
 def spread(errors: Sequence[float]) -> float:
     """Standard error of the next interval as a part of it, from the `error` of those before."""
-    return FEW * quantile(errors, FIRST_ERRORS, FIRST_WEIGHT, MEMORY) / 1.96
+    return FEW_ERRORS * quantile(errors, FIRST_ERRORS, FIRST_WEIGHT, ERROR_MEMORY) / NORMAL_COVERED

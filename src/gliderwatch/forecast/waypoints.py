@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
+from gliderwatch.forecast.constants import WAYPOINT_LATE, WAYPOINTS_HEARD
 from gliderwatch.forecast.state import Place
 from gliderwatch.model import Segment
 from gliderwatch.navigation.samples import joined
 
 Heard = tuple[tuple[float, float, float], ...]
 """Waypoints as they were told: time (s), latitude and longitude (degrees), in order of time."""
-
-KEPT = 32
-"""Reports that are remembered: a corrected dive asks for the waypoint of some hours ago."""
-LATE = 300.0
-"""Seconds after a fix in which a file that ends with it may still tell the waypoint."""
 
 
 def heard(known: Heard, segment: Segment) -> Heard:
@@ -23,7 +19,7 @@ def heard(known: Heard, segment: Segment) -> Heard:
     for report in sorted({*known, *told}):
         if not out or report[1:] != out[-1][1:]:
             out.append(report)
-    return tuple(out[-KEPT:])
+    return tuple(out[-WAYPOINTS_HEARD:])
 
 
 def bound_for(known: Heard, t: float) -> Place | None:
@@ -32,5 +28,5 @@ def bound_for(known: Heard, t: float) -> Place | None:
     >>> bound_for(((0.0, 27.0, -84.0), (9000.0, 27.5, -84.0)), 8000.0)
     (27.0, -84.0)
     """
-    before = [(lat, lon) for told, lat, lon in known if told <= t + LATE]
+    before = [(lat, lon) for told, lat, lon in known if told <= t + WAYPOINT_LATE]
     return before[-1] if before else None

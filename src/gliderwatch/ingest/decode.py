@@ -20,25 +20,29 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, InvalidStateError
+from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from threading import Lock
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 from pebble import ProcessExpired, ProcessPool
 
 from gliderwatch.errors import GliderwatchError, Quarantine, Retry
 from gliderwatch.ingest import names
-from gliderwatch.ingest.caches import Staging
+from gliderwatch.ingest.caches import Staging, checksum
 from gliderwatch.ingest.cycles import Sensors, intact, parse_sensor_list
 from gliderwatch.ingest.header import Header, parse_header, plain, read_regular
+from gliderwatch.ingest.science import science_files
 from gliderwatch.ingest.scratch import Scratch
-from gliderwatch.ingest.segment import SENSORS, TIME, Samples, build_segment
+from gliderwatch.ingest.segment import PRESSURES, SENSORS, TIME, Samples, build_segment, tells_depth
 from gliderwatch.ingest.worker_result import decoded, encoded
 from gliderwatch.model import Segment
 
 _LARGEST = 512 * 1024 * 1024
+_SCIENCE_TIME = "sci_m_present_time"
 _staging = cache(Staging)
 
 
@@ -49,17 +53,59 @@ def decode(path: Path, cache_folders: Sequence[Path]) -> Segment:
     `cache_folders`, `Retry` for what may pass, `Quarantine` for a file that is no use as it is.
     """
     try:
-        data, _ = read_regular(path, _LARGEST)
-        data = plain(data, _LARGEST)
-        header = parse_header(data)
-        if header.factored:
-            staged = _staging().get(header, cache_folders)
-            return _decode(data, header, header.length, staged.sensors, staged.folder)
-        sensors, start = _own_list(data, header)
-        with tempfile.TemporaryDirectory() as folder:
-            return _decode(data, header, start, sensors, Path(folder))
+        content = _content(path, cache_folders, TIME, SENSORS)
+        header, n_cycles, samples, digest = content.header, content.n_cycles, content.samples, content.digest
+        if n_cycles and not tells_depth(samples):
+            science = _science(path, header, cache_folders)
+            if science is not None:
+                n_cycles += science.n_cycles  # with it the copy holds more
+                samples = {**science.samples, **samples}
+                digest.update(science.digest.digest())
     except OSError as error:
         raise Retry(f"cannot be read: {error}") from error
+    completeness = (names.rank(header.kind), n_cycles, digest.hexdigest())
+    return build_segment(header, samples, completeness, content.damaged)
+
+
+@dataclass(frozen=True, slots=True)
+class _Content:
+    """What one file holds: intact cycles, their samples, and their ``digest``; bytes ``damaged``."""
+
+    header: Header
+    n_cycles: int
+    samples: Samples
+    digest: Any
+    damaged: int
+
+
+def _science(path: Path, header: Header, cache_folders: Sequence[Path]) -> _Content | None:
+    """The pressure in the science file beside a flight file; None where there is none of the same segment.
+
+    What is wrong with it is no reason to do without the flight file.
+    """
+    for beside in science_files(path):
+        try:
+            found = _content(beside, cache_folders, _SCIENCE_TIME, PRESSURES[-1:], science=True)
+        except (GliderwatchError, OSError):
+            continue
+        if found.header.id.name == header.id.name and tells_depth(found.samples):
+            return found
+    return None
+
+
+def _content(
+    path: Path, cache_folders: Sequence[Path], time: str, wanted: Sequence[str], *, science: bool = False
+) -> _Content:
+    """The intact part of a file: of its sensors those `wanted`, by its sensor `time`."""
+    data, _ = read_regular(path, _LARGEST)
+    data = plain(data, _LARGEST)
+    header = parse_header(data, science=science)
+    if header.factored:
+        staged = _staging().get(header, cache_folders)
+        return _decode(data, header, header.length, staged.sensors, staged.folder, time, wanted)
+    sensors, start = _own_list(data, header)
+    with tempfile.TemporaryDirectory() as folder:
+        return _decode(data, header, start, sensors, Path(folder), time, wanted)
 
 
 def _own_list(data: bytes, header: Header) -> tuple[Sensors, int]:
@@ -67,14 +113,24 @@ def _own_list(data: bytes, header: Header) -> tuple[Sensors, int]:
         sensors, start = parse_sensor_list(data, header.length, header.n_sensors)
     except ValueError as error:
         raise Quarantine(f"cut or damaged in its sensor list: {error}") from error
+    if int(checksum(data[header.length : start]), 16) != int(header.crc, 16):
+        raise Quarantine("damaged in its sensor list: it has not the checksum that the header says")
     if len(sensors.names) != header.n_held:
         raise Quarantine("damaged: header and sensor list hold different numbers of sensors")
     return sensors, start
 
 
-def _decode(data: bytes, header: Header, start: int, sensors: Sensors, folder: Path) -> Segment:
-    if TIME not in sensors.names:
-        raise Quarantine(f"holds no {TIME}: nothing in it has a time")
+def _decode(
+    data: bytes,
+    header: Header,
+    start: int,
+    sensors: Sensors,
+    folder: Path,
+    time: str,
+    wanted: Sequence[str],
+) -> _Content:
+    if time not in sensors.names:
+        raise Quarantine(f"holds no {time}: nothing in it has a time")
     try:
         n_cycles, end, damaged = intact(data, start, sensors)
     except ValueError as error:
@@ -83,14 +139,13 @@ def _decode(data: bytes, header: Header, start: int, sensors: Sensors, folder: P
         raise Quarantine("damaged: not one intact cycle of values in it")
     # The hash leaves out what was lost, so that equal content is equal in every copy of a segment.
     content = memoryview(data)[:end]
-    completeness = (names.rank(header.kind), n_cycles, hashlib.sha256(content).hexdigest())
-    samples = _read(content, sensors, folder) if n_cycles else {}
-    return build_segment(header, samples, completeness, damaged)
+    held = [name for name in wanted if name in sensors.names]
+    samples = _read(content, held, folder) if n_cycles and held else {}
+    return _Content(header, n_cycles, samples, hashlib.sha256(content), damaged)
 
 
-def _read(content: memoryview, sensors: Sensors, folder: Path) -> Samples:
-    """Times and values by sensor, in the glider's units, of all sensors wanted that the file holds."""
-    wanted = [name for name in SENSORS if name in sensors.names]
+def _read(content: memoryview, wanted: Sequence[str], folder: Path) -> Samples:
+    """Times and values by sensor, in the glider's units, of the sensors wanted, which the file holds."""
     with os.fdopen(os.memfd_create("segment", os.MFD_CLOEXEC), "wb") as file:
         file.write(content)
         file.flush()

@@ -30,6 +30,14 @@ _BLOCK = 32 * 1024
 _MAX_TAGS = 64
 _MAX_SENSORS = 20_000
 _ENCODING = 5
+_EARLIER = {
+    "1": "of May to September 2001",
+    "2": "of September 2001 to September 2002",
+    "3": "of September 2002 to July 2003",
+    "4": "that came in July 2003",
+}
+"""When gliders got the software that writes an encoding version (dbd_file_format.txt, its changes and HISTORY
+OF RELEASED VERSIONS). There 5 is the version of a file of August 2008."""
 _FIRST_YEAR, _LAST_YEAR = 1990, 2100
 _NO_FILES = {
     stat.S_IFDIR: "a folder",
@@ -71,7 +79,6 @@ class Header:
     factored: bool
     n_sensors: int
     n_held: int
-    eightthree: str
     length: int
 
 
@@ -171,13 +178,15 @@ def decompress(data: bytes, limit: int) -> bytes:
     return b"".join(parts)
 
 
-def parse_header(data: bytes) -> Header:
-    """The header at the start of `data`, what `plain` gives. Raises `Quarantine` with the reason in words."""
+def parse_header(data: bytes, *, science: bool = False) -> Header:
+    """The header at the start of `data`, what `plain` gives, of a flight file or of one of `science`.
+
+    Raises `Quarantine` with the reason in words.
+    """
     tags, length = _tags(data)
-    if int(tags["encoding_ver"]) != _ENCODING:
-        raise Quarantine(f"encoding version {tags['encoding_ver']} is not known, only {_ENCODING}")
-    kind = names.kind(f"x.{tags['filename_extension']}")
-    if kind is None:
+    name = f"x.{tags['filename_extension']}"
+    kind = names.kind(name) if not science else "".join(names.flight_of(name)[:1])
+    if not kind:
         raise Quarantine(f"holds {tags['filename_extension']} data, not flight data (sbd, mbd, dbd)")
     full_name = tags["full_filename"]
     glider = names.glider_of(full_name)
@@ -197,7 +206,6 @@ def parse_header(data: bytes) -> Header:
         factored=tags["sensor_list_factored"] == "1",
         n_sensors=n_sensors,
         n_held=n_held,
-        eightthree=tags["the8x3_filename"].lower(),
         length=length,
     )
 
@@ -214,6 +222,8 @@ def _tags(data: bytes) -> tuple[dict[str, str], int]:
         if key in tags:
             raise Quarantine("damaged: a line of the header is there twice")
         tags[key] = value.strip()
+        if key == "encoding_ver":  # at once: others may have other lines
+            _check_version(tags[key])
         if key == "num_ascii_tags":
             n = int(value) if re.fullmatch(r" *\d{1,3}\s*", value, re.ASCII) else 0
         start = end + 1
@@ -223,6 +233,24 @@ def _tags(data: bytes) -> tuple[dict[str, str], int]:
         if not re.fullmatch(pattern, tags.get(key, ""), re.ASCII):
             raise Quarantine(f"damaged: {key} in the header is missing or wrong")
     return tags, start
+
+
+def _check_version(text: str) -> None:
+    """Raises Quarantine for an encoding version that cannot be read, with the software it belongs to."""
+    if not re.fullmatch(_PATTERNS["encoding_ver"], text, re.ASCII) or int(text) == _ENCODING:
+        return  # what is no number is damage, told later
+    version = str(int(text))
+    if version in _EARLIER:
+        raise Quarantine(
+            f"encoding version {version} belongs to glider software {_EARLIER[version]}; only version "
+            f"{_ENCODING} (all software since 2008) can be read: update the software of the glider"
+        )
+    if version == "0":
+        raise Quarantine("encoding version 0 was reserved for converted files: no glider writes it")
+    raise Quarantine(
+        f"encoding version {version} belongs to glider software newer than this gliderwatch, which reads "
+        f"version {_ENCODING}: look for a newer gliderwatch"
+    )
 
 
 def _opened_at(text: str) -> float:

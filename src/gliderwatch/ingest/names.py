@@ -7,14 +7,29 @@ from calendar import timegm
 from pathlib import PurePath
 
 _FLIGHT = {"sbd": "sbd", "mbd": "mbd", "dbd": "dbd", "scd": "sbd", "mcd": "mbd", "dcd": "dbd"}
+_SCIENCE_OF = {"sbd": ("tbd", "tcd"), "mbd": ("nbd", "ncd"), "dbd": ("ebd", "ecd")}
+_FLIGHT_OF = {"tbd": ("sbd", "scd"), "nbd": ("mbd", "mcd"), "ebd": ("dbd", "dcd")}
 _CACHE = frozenset({"cac", "ccc"})
 _RANKS = {"sbd": 0, "mbd": 1, "dbd": 2}
 _STAMP = re.compile(r"(?<!\d)(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)(?!\d)", re.ASCII)
 _SEGMENT = re.compile(r"(?P<glider>.+)-\d{4}-\d{1,3}-\d{1,5}-\d{1,5}", re.ASCII | re.DOTALL)
 
 
+_UNDER_WAY = re.compile(r"[.~].*|.*(~|\.(tmp|temp|part|partial|filepart)(\..*)?)", re.IGNORECASE | re.DOTALL)
+"""Names that programs give a file until all of it is there (rsync, WinSCP, browsers, `deliver`)."""
+
+
+def is_under_way(name: str) -> bool:
+    """Whether the name is that of a transfer under way, or of one that was given up: never of data.
+
+    >>> is_under_way(".electa-2022-308-3-2.sbd"), is_under_way("92.tmp.sbd"), is_under_way("92.sbd")
+    (True, True, False)
+    """
+    return _UNDER_WAY.fullmatch(name) is not None
+
+
 def _suffix(name: str) -> str:
-    return PurePath(name).suffix[1:].lower()
+    return "" if is_under_way(name) else PurePath(name).suffix[1:].lower()
 
 
 def kind(name: str) -> str | None:
@@ -24,6 +39,29 @@ def kind(name: str) -> str | None:
     ('sbd', None, None)
     """
     return _FLIGHT.get(_suffix(name))
+
+
+def is_science(name: str) -> bool:
+    """Whether the name is that of science data (tbd, ebd, ...)."""
+    return bool(flight_of(name))
+
+
+def science_of(name: str) -> tuple[str, ...]:
+    """The suffixes of the science files that belong to a flight file of this name; none for others.
+
+    >>> science_of("00920000.SCD"), science_of("00920000.tbd")
+    (('tbd', 'tcd'), ())
+    """
+    return _SCIENCE_OF.get(kind(name) or "", ())
+
+
+def flight_of(name: str) -> tuple[str, ...]:
+    """The suffixes of the flight files that belong to a science file of this name; none for others.
+
+    >>> flight_of("00920000.tcd"), flight_of("00920000.sbd")
+    (('sbd', 'scd'), ())
+    """
+    return _FLIGHT_OF.get(_suffix(name).replace("c", "b"), ())
 
 
 def is_cache(name: str) -> bool:

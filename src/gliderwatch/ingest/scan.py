@@ -26,6 +26,11 @@ _DEEPEST = 6
 """Folders between a root and `from-glider`, so that a wrong root does not mean the whole disk."""
 
 
+def is_left_out(folder: str) -> bool:
+    """Whether a folder of this name holds no data: noise, archives, hidden ones (rsync's `.~tmp~`)."""
+    return folder.startswith(".") or folder.lower() in IGNORED
+
+
 @dataclass(frozen=True, slots=True)
 class Place:
     """A folder to look in: a root, or where ``glider`` is not empty an explicit path of that glider."""
@@ -38,7 +43,7 @@ class Place:
         if not path.is_relative_to(self.path):
             return None
         parts = path.relative_to(self.path).parts[:-1]
-        if any(part.lower() in IGNORED for part in parts):
+        if any(is_left_out(part) for part in parts):
             return None
         if self.glider:
             return self.glider
@@ -116,7 +121,7 @@ def _scan(
             yield from (found for found in below if names.is_log(found.path.name) == (name == LOGS))
     elif depth < _DEEPEST:
         for name in sorted(folders):
-            if name.lower() not in IGNORED:
+            if not is_left_out(name):
                 yield from _scan(folder / name, glider_folder, depth + 1, seen, unread)
 
 

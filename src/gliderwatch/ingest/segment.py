@@ -21,6 +21,9 @@ from gliderwatch.ingest.header import Header
 from gliderwatch.model import Array, Segment, Series, readonly
 
 TIME = "m_present_time"
+DEPTH = "m_depth"
+PRESSURES = ("m_pressure", "sci_water_pressure")
+"""Bar, above that of the air; the first that a file has stands in for a depth that is missing."""
 _NO_FIX = 69696969.0
 _POSITION = "DDMM.mmmm"
 _UNITS = {
@@ -120,7 +123,7 @@ QUANTITIES = (
     _q("leak_voltage_forward", "m_leakdetect_voltage_forward", "volts", 0, 5, "leak detector, forward"),
     _q("leak_voltage_science", "m_leakdetect_voltage_science", "volts", 0, 5, "leak detector, science bay"),
 )
-SENSORS = (TIME, *(sensor for quantity in QUANTITIES for sensor in quantity.sensors))
+SENSORS = (TIME, *PRESSURES, *(sensor for quantity in QUANTITIES for sensor in quantity.sensors))
 """All Slocum sensors that are read where a file has them."""
 
 _GROUPS = tuple(
@@ -143,15 +146,16 @@ def build_segment(
 
     `damaged` bytes that could not be read are counted in ``Segment.dropped`` as ``bytes``.
     """
-    opened = header.id.opened_at
+    opened, samples = header.id.opened_at, _with_depth(samples)
     window = (max(opened - _BEFORE, _EARLIEST), opened + _AFTER)
     quantities: dict[str, Series] = {}
-    dropped = {"bytes": damaged}
+    dropped, notes = {"bytes": damaged}, list[str]()
     for rows in _GROUPS:
-        kept, lost = _clean(rows, samples, window)
+        kept, lost, corrected = _clean(rows, samples, window)
         quantities |= kept
         dropped |= lost
-    declination, source = _declination(quantities)
+        notes += corrected
+    declination, source = declination_of(quantities)
     cycles = samples[TIME][0] if TIME in samples else np.empty(0)
     ends = [series.t[-1] for series in quantities.values()]
     ends += cycles[_within(cycles, *window)].tolist()
@@ -165,19 +169,49 @@ def build_segment(
         declination=declination,
         declination_source=source,
         dropped={name: n for name, n in dropped.items() if n},
+        notes=tuple(notes),
     )
+
+
+def _with_depth(samples: Samples) -> Samples:
+    """The samples; with the depth that the pressure says where there is none."""
+    t, bar = next((samples[name] for name in PRESSURES if _holds(samples, name)), (None, None))
+    if _holds(samples, DEPTH) or t is None or bar is None:
+        return samples
+    return {**samples, DEPTH: (t, depth_of(bar))}
+
+
+def tells_depth(samples: Samples) -> bool:
+    """Whether there is a value of the depth, or of a pressure that stands in for it."""
+    return any(_holds(samples, name) for name in (DEPTH, *PRESSURES))
+
+
+def _holds(samples: Samples, name: str) -> bool:
+    return name in samples and len(samples[name][0]) > 0
+
+
+def depth_of(bar: Array) -> Array:
+    """Depth (m) of a pressure above that of the air (bar), at latitude 45 degrees: elsewhere 0.3 % off.
+
+    Saunders (1981), Practical conversion of pressure to depth, J. Phys. Oceanogr. 11, 573-574.
+
+    >>> round(float(depth_of(np.array([500.0]))[0]), 1)
+    4902.0
+    """
+    decibar = 10.0 * bar
+    return (1 - 8.545e-3) * decibar - 2.21e-6 * decibar**2
 
 
 def _clean(
     rows: tuple[Quantity, ...], samples: Samples, window: tuple[float, float]
-) -> tuple[dict[str, Series], dict[str, int]]:
-    """The good samples of one quantity or of a pair, and how many were dropped of each."""
+) -> tuple[dict[str, Series], dict[str, int], list[str]]:
+    """The good samples of one quantity or of a pair, how many were dropped of each, and notes."""
     found = [
         next((samples[s] for s in row.sensors if s in samples and len(samples[s][0])), None) for row in rows
     ]
     raw = [each for each in found if each is not None]
     if len(raw) < len(rows):
-        return {}, {}
+        return {}, {}, []
     t, columns = _together(raw)
     with np.errstate(all="ignore"):
         absent = reduce(or_, [v == row.absent for row, v in zip(rows, columns, strict=True)])
@@ -185,6 +219,7 @@ def _clean(
             absent |= reduce(and_, [v == 0.0 for v in columns])
         values = [row.to_si(v) for row, v in zip(rows, columns, strict=True)]
         good = _within(t, *window) & ~absent
+        values, far = _wrapped(rows, values)
         for row, v in zip(rows, values, strict=True):
             good &= _within(v, row.low, row.high)
     at = np.flatnonzero(good)
@@ -194,9 +229,24 @@ def _clean(
     wanted = len(times) + int(np.count_nonzero(absent))
     lost = {row.name: len(each[0]) - wanted for row, each in zip(rows, raw, strict=True)}
     if not len(times):
-        return {}, lost
+        return {}, lost, []
     kept = {row.name: Series(times, readonly(v[at])) for row, v in zip(rows, values, strict=True)}
-    return kept, lost
+    n = int(np.count_nonzero(far & good))
+    notes = [f"{n} values of {rows[-1].name} beyond 180 degrees brought back to -180 to 180"] if n else []
+    return kept, lost, notes
+
+
+def _wrapped(rows: tuple[Quantity, ...], values: list[Array]) -> tuple[list[Array], NDArray[np.bool_]]:
+    """The values with longitudes of up to a turn brought back to -180 to 180, and where those were beyond.
+
+    A glider counts on as it crosses the antimeridian.
+    """
+    far = np.zeros(len(values[0]), dtype=np.bool_)
+    if rows[0].slocum_unit != _POSITION:
+        return values, far
+    lat, lon = values
+    far = (np.abs(lon) > 180.0) & (np.abs(lon) <= 360.0)
+    return [lat, np.where(far, lon - np.copysign(360.0, lon), lon)], far
 
 
 def _together(raw: list[tuple[Array, Array]]) -> tuple[Array, list[Array]]:
@@ -218,7 +268,7 @@ def _within(values: Array, low: float, high: float) -> NDArray[np.bool_]:
 # --------------------------------------------------------------------------- declination
 
 
-def _declination(quantities: Mapping[str, Series]) -> tuple[float | None, str]:
+def declination_of(quantities: Mapping[str, Series]) -> tuple[float | None, str]:
     """Declination (rad, east positive) that the glider reports, else the model's at its first position."""
     if "magnetic_variation" in quantities:
         variation = quantities["magnetic_variation"].v

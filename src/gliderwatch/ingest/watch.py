@@ -59,6 +59,13 @@ class FileChanged:
 
 
 @dataclass(frozen=True, slots=True)
+class ScienceChanged:
+    """A science file of a glider was written, came or went: the flight file beside it may need it."""
+
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
 class CacheChanged:
     """A cache file was written, or came: files that wait for one can be tried again."""
 
@@ -77,7 +84,7 @@ class EventsLost:
     """Inotify could not keep up and lost events: restart the watcher, and scan."""
 
 
-Change = FileChanged | CacheChanged | TreeChanged | EventsLost
+Change = FileChanged | ScienceChanged | CacheChanged | TreeChanged | EventsLost
 
 
 class Sink(Protocol):
@@ -246,11 +253,12 @@ class Watcher:
             self._queue.put(TreeChanged(path))
         elif names.is_cache(path.name) and path.parent in self._caches:
             self._queue.put(CacheChanged(path))
-        elif is_log or names.kind(path.name):
+        elif is_log or names.kind(path.name) or names.is_science(path.name):
             folders = (place.glider_folder(path) for place in self._places)
             glider_folder = next((folder for folder in folders if folder), None)
             if glider_folder:
-                self._queue.put(FileChanged(path, glider_folder))
+                is_flight = names.kind(path.name) is not None
+                self._queue.put(FileChanged(path, glider_folder) if is_flight else ScienceChanged(path))
 
 
 class _Reader(InotifyFD):

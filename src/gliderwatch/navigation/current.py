@@ -13,14 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gliderwatch.model import Current, Segment
+from gliderwatch.navigation.constants import CURRENT_CORRECTED, CURRENT_EARLY, SAME_CURRENT
 from gliderwatch.navigation.frame import magnetic_to_true
 from gliderwatch.navigation.samples import joined
-
-EARLY = 120.0
-"""Seconds that a current may be published before the last sample under water."""
-CORRECTED = 600.0
-"""Seconds after a surfacing: what is first published later is not the first estimate any more."""
-_SAME = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +54,7 @@ def _changes(
     for t, x, y in zip(times.tolist(), east.tolist(), north.tolist(), strict=True):
         if (x, y) == (0.0, 0.0):
             continue
-        if last is None or abs(x - last[0]) > _SAME or abs(y - last[1]) > _SAME:
+        if last is None or abs(x - last[0]) > SAME_CURRENT or abs(y - last[1]) > SAME_CURRENT:
             u, v = magnetic_to_true(np.array([x, y]), declination).tolist()
             out.append(Report(t, u, v, final))
             last = (x, y)
@@ -74,7 +69,7 @@ def pair(reports: Sequence[Report], surfaced: Sequence[float]) -> list[int]:
     >>> pair([Report(50.0, 0, 0, False), Report(2000.0, 0, 0, False)], [1000.0, 9000.0])
     [-1, 0]
     """
-    ends = np.asarray(surfaced, dtype=np.float64) - EARLY
+    ends = np.asarray(surfaced, dtype=np.float64) - CURRENT_EARLY
     return [int(np.searchsorted(ends, report.t, "right")) - 1 for report in reports]
 
 
@@ -82,7 +77,7 @@ def updated(current: Current | None, report: Report, surfaced: float) -> Current
     """The current of a dive that `surfaced` (s) after one more report: the later replaces the earlier.
 
     Many files hold no sensor of corrected values. Then the second value of a dive is the corrected
-    one, and so is a first one that is published `CORRECTED` after the surfacing.
+    one, and so is a first one that is published `CURRENT_CORRECTED` after the surfacing.
     """
-    corrected = report.final or current is not None or report.t - surfaced > CORRECTED
+    corrected = report.final or current is not None or report.t - surfaced > CURRENT_CORRECTED
     return Current(report.u, report.v, corrected)

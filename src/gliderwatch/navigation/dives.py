@@ -8,25 +8,38 @@ and a dive is told again when more of it is known.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
-from gliderwatch.model import Dive, Fix, Segment, Unusable
+from gliderwatch.model import Dive, Fix, Segment, Series, Unusable, readonly
+from gliderwatch.navigation.clock import forward_step
+from gliderwatch.navigation.constants import (
+    CURRENT_EARLY,
+    FASTEST_OVER_GROUND,
+    HEADING_GAP,
+    HIDING_HOLE,
+    JUMP,
+    LONGEST_DIVE,
+    SHORTEST_DIP,
+    SHORTEST_DIVE,
+    SHORTEST_HOLE,
+    SPARSE,
+    SUSPECT_DISTANCE,
+)
 from gliderwatch.navigation.current import Known, Report, new_reports, pair, updated
 from gliderwatch.navigation.features import flight_features, track_features
-from gliderwatch.navigation.fixes import FASTEST, SUSPECT, distance, new_fixes, stays
-from gliderwatch.navigation.flight import SPARSE, Flight, find_flight, lengthened, unseen
-from gliderwatch.navigation.quality import flight_notes, heading_gap, segment_notes, why_unusable
+from gliderwatch.navigation.fixes import distance, new_fixes, stays
+from gliderwatch.navigation.flight import Flight, find_flight, lengthened, unseen
+from gliderwatch.navigation.pressure import zeroed
+from gliderwatch.navigation.quality import (
+    corrected_notes,
+    flight_notes,
+    heading_gap,
+    segment_notes,
+    unsteered,
+    why_unusable,
+)
 from gliderwatch.navigation.samples import Samples, after, concatenated, get, prepare
 from gliderwatch.navigation.track import build_track
-
-SHORTEST = 900.0
-"""Seconds: a shorter stay under water says too little of speed, a shorter hole in the data is none."""
-DIP = 120.0
-"""Seconds: a stay under water this long is a dive of which the glider computes a current."""
-LONGEST = 3 * 86400.0
-"""Seconds between fixes: a longer one is not a dive but a gap between deployments."""
-HIDING = 3600.0
-"""Seconds: a hole in the data this long may hide a whole dive; in shorter ones a glider waits at the
-surface between two missions, and corrects the current of the dive before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +49,13 @@ class Navigation:
     ``fix`` is the last good one and ``carry`` the samples after it; ``declination`` (rad) the last known,
     ``declination_t`` when the glider told it (s; None: a model's); ``last_t`` the end of the
     latest segment (s); ``holes`` the times (start, end) since the fix of which no segment has come;
-    ``holder`` the segment that holds the flight since the fix; ``known`` the currents reported last and
-    ``reports`` those whose dive is not told yet; ``dive`` the last whole dive, ``untold`` the
-    surfacing (s) of a later one that is not told; ``notes`` on the data since the fix.
+    ``calls`` those between two segments that follow each other, in which none is missing, and ``last_name``
+    the name of the latest segment if it holds a whole flight and ends at the surface (else empty: it may
+    break off); ``holder`` the segment that holds the flight since the fix; ``known`` the currents reported
+    last and ``reports`` those whose dive is not told yet; ``dive`` the last whole dive, ``untold`` the
+    surfacing (s) of a later one that is not told; ``notes`` on the data since the fix;
+    ``latest`` the name of the latest segment; ``surface_depth`` what the depth sensor shows at the surface
+    (m; 0: near enough).
     """
 
     fix: Fix | None = None
@@ -47,12 +64,16 @@ class Navigation:
     declination_t: float | None = None
     last_t: float | None = None
     holes: tuple[tuple[float, float], ...] = ()
+    calls: tuple[tuple[float, float], ...] = ()
+    last_name: str = ""
     holder: str = ""
     known: Known = (None, None)
     reports: tuple[Report, ...] = ()
     dive: Dive | None = None
     untold: float | None = None
     notes: tuple[str, ...] = ()
+    latest: str = ""
+    surface_depth: float = 0.0
 
 
 def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]:
@@ -63,34 +84,40 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
     """
     state = _with_declination(state, segment)
     fresh = prepare(segment, state.declination or 0.0)
+    state, ahead = _with_clock(state, segment, fresh)
+    fresh, surface = zeroed(fresh, state.fix, state.surface_depth)
+    state = replace(state, surface_depth=surface)
     samples = concatenated(state.carry, fresh)
     reports, known = new_reports(segment, state.declination or 0.0, state.known)
     quality = segment_notes(segment, state.declination, from_model=state.declination_t is None)
+    quality += corrected_notes(ahead, surface)
     state = replace(_placed(state, segment, fresh, quality), known=known)
 
     before = state.dive
     fixes = new_fixes(samples, state.fix)
     state, told = _withdraw_old_fix(state, fixes)
     untold = [state.untold] if state.untold is not None else []
-    for first, last in stays(fixes, DIP):
+    for first, last in stays(fixes, SHORTEST_DIP):
         flight = _flight_since(state, samples, first)
-        if flight is not None and flight.duration >= SHORTEST:
+        if flight is not None and flight.duration >= SHORTEST_DIVE:
             told.append(_dive(state, segment.id.glider, samples, flight, first))
-        elif flight is not None and flight.duration >= DIP:
+        elif flight is not None and flight.duration >= SHORTEST_DIP:
             untold.append(flight.end)
         holes = tuple((max(a, last.t), b) for a, b in state.holes if b > last.t)
-        state = replace(state, fix=last, holder=segment.id.name, holes=holes, notes=quality)
+        calls = tuple((a, b) for a, b in state.calls if b > last.t)
+        state = replace(state, fix=last, holder=segment.id.name, holes=holes, calls=calls, notes=quality)
 
-    oldest = (state.last_t or 0.0) - LONGEST
+    oldest = (state.last_t or 0.0) - LONGEST_DIVE
     carry = after(samples, max(state.fix.t, oldest) if state.fix is not None else oldest)
     under_way = _flight_since(state, carry, None)
     told, waiting = _with_currents(told, untold, under_way, [*state.reports, *reports])
     waiting = [report for report in waiting if report.t > oldest]
     latest, later = (told[-1] if told else None), max(untold, default=None)
     later = later if later is not None and (latest is None or later > latest.t_surface) else None
-    state = replace(state, carry=carry, reports=tuple(waiting), dive=latest, untold=later)
+    name = state.last_name if under_way is None else ""
+    state = replace(state, carry=carry, reports=tuple(waiting), dive=latest, untold=later, last_name=name)
     news = [d for d in told if d is not before]
-    if under_way is not None and under_way.duration >= SHORTEST:
+    if under_way is not None and under_way.duration >= SHORTEST_DIVE:
         news.append(_dive(state, segment.id.glider, carry, under_way, None))
     return state, news
 
@@ -105,24 +132,65 @@ def _with_declination(state: Navigation, segment: Segment) -> Navigation:
     t = segment.id.opened_at
     if segment.declination_source == "glider":
         return replace(state, declination=segment.declination, declination_t=t)
-    if state.declination_t is not None and t - state.declination_t < LONGEST:
+    if state.declination_t is not None and t - state.declination_t < LONGEST_DIVE:
         return state
     return replace(state, declination=segment.declination, declination_t=None)
 
 
 def _placed(state: Navigation, segment: Segment, fresh: Samples, quality: tuple[str, ...]) -> Navigation:
     """The state with the place of a segment in time: a hole before it, and whether it holds the flight."""
-    holes = state.holes
-    if state.last_t is not None and segment.id.opened_at - state.last_t > SHORTEST:
-        holes = (*holes, (state.last_t, segment.id.opened_at))
+    holes, calls = state.holes, state.calls
+    if state.last_t is not None and segment.id.opened_at - state.last_t > SHORTEST_HOLE:
+        gap = (state.last_t, segment.id.opened_at)
+        if follows(state.last_name, segment.id.name):
+            calls = (*calls, gap)
+        else:
+            holes = (*holes, gap)
     flies = find_flight(fresh, segment.id.opened_at - SPARSE, segment.last_t) is not None
     return replace(
         state,
         holes=holes,
+        calls=calls,
+        last_name=segment.id.name if flies else "",
         notes=tuple(dict.fromkeys(state.notes + quality)),
         last_t=max(segment.last_t, state.last_t or segment.last_t),
         holder=segment.id.name if flies or not state.holder else state.holder,
+        latest=segment.id.name,
     )
+
+
+def follows(before: str, name: str) -> bool:
+    """Whether a segment is the next one of the same mission after another, so that none is missing between
+    them.
+
+    >>> follows("unit-2024-120-3-7", "unit-2024-120-3-8"), follows("unit-2024-120-3-7", "unit-2024-120-3-9")
+    (True, False)
+    """
+    mission, _, number = name.rpartition("-")
+    mission_before, _, number_before = before.rpartition("-")
+    if not (number.isdecimal() and number_before.isdecimal() and mission == mission_before):
+        return False
+    return int(number) == int(number_before) + 1
+
+
+def _with_clock(state: Navigation, segment: Segment, fresh: Samples) -> tuple[Navigation, float]:
+    """The state by the clock of a segment, where that was set forward before it, and by how much (s).
+
+    Nothing comes between two segments of consecutive numbers. Where the glider was at the surface at the end
+    of one and at the beginning of the next, and near enough, the hours between the two are none.
+    """
+    step = forward_step(
+        state.latest, state.last_t, state.fix, segment.id, next(iter(new_fixes(fresh, state.fix)), None)
+    )
+    if not step or state.fix is None or state.last_t is None:
+        return state, 0.0
+    carry = {name: Series(readonly(s.t + step), s.v) for name, s in state.carry.items()}
+    holes = tuple((a + step, b + step) for a, b in state.holes)
+    calls = tuple((a + step, b + step) for a, b in state.calls)
+    fix, last_t = replace(state.fix, t=state.fix.t + step), state.last_t + step
+    return replace(
+        state, fix=fix, last_t=last_t, carry=MappingProxyType(carry), holes=holes, calls=calls
+    ), step
 
 
 def _withdraw_old_fix(state: Navigation, fixes: list[Fix]) -> tuple[Navigation, list[Dive]]:
@@ -131,7 +199,7 @@ def _withdraw_old_fix(state: Navigation, fixes: list[Fix]) -> tuple[Navigation, 
         return state, []
     if fixes and state.fix is not None and state.dive.end == state.fix:
         gap = fixes[0].t - state.fix.t
-        if gap < SHORTEST and distance(state.fix, fixes[0]) > FASTEST * gap + 100.0:
+        if gap < SHORTEST_DIVE and distance(state.fix, fixes[0]) > FASTEST_OVER_GROUND * gap + JUMP:
             withdrawn = replace(
                 state.dive,
                 end=fixes[0],
@@ -150,13 +218,18 @@ def _flight_since(state: Navigation, samples: Samples, end: Fix | None) -> Fligh
         state.fix.t if state.fix is not None else min((float(s.t[0]) for s in samples.values()), default=0.0)
     )
     last = end.t if end is not None else max((float(s.t[-1]) for s in samples.values()), default=0.0)
-    if not DIP < last - first <= LONGEST:
+    if not SHORTEST_DIP < last - first <= LONGEST_DIVE:
         return None
     flight = find_flight(samples, first, last)
-    if flight is None and state.fix is not None and (end is None or distance(state.fix, end) > SUSPECT):
-        hidden = [(a, min(b, last)) for a, b in state.holes if min(b, last) - a >= HIDING]
+    if (
+        flight is None
+        and state.fix is not None
+        and (end is None or distance(state.fix, end) > SUSPECT_DISTANCE)
+    ):
+        hidden = [(a, min(b, last)) for a, b in state.holes if min(b, last) - a >= HIDING_HOLE]
         flight = Flight(*hidden[-1], evidence="missing") if hidden else None
-        if flight is None and end is not None and last - first >= HIDING:
+        called = sum(min(b, last) - max(a, first) for a, b in state.calls if a < last and b > first)
+        if flight is None and end is not None and last - first - called >= HIDING_HOLE:
             flight = unseen(samples, first, last)
     return flight
 
@@ -174,9 +247,12 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
     else:
         track = build_track(samples, flight, start, end)
         gap = heading_gap(samples, flight)
+        known = track_features(samples, flight, track)
+        unsure = unsteered(samples, flight)[0] is not None and not known.heading_reckoned
         features = replace(
-            track_features(samples, flight, track),
-            heading_gap=gap if gap > 2 * SPARSE else None,
+            known,
+            heading_assumed=known.heading_assumed or unsure,
+            heading_gap=gap if gap > HEADING_GAP else None,
             unobserved=missing,
         )
     return Dive(
@@ -201,16 +277,41 @@ def _with_currents(
 ) -> tuple[list[Dive], list[Report]]:
     """The dives with the currents published for them, and the reports of a dive that is not told yet.
 
-    `untold` are surfacings (s) of dives that are never told: their currents are nobody's.
+    `untold` are surfacings (s) of dives that are never told: their currents are nobody's. One that was
+    published well within a flight is that of a part of it, up to a surfacing without a fix: so is then the
+    one at its end, and neither is the current between the two fixes.
     """
+    flights = [(d.t_dive, d.t_surface, i) for i, d in enumerate(told)]
+    if under_way is not None:
+        flights.append((under_way.start, under_way.end, -1))
     ends: list[tuple[float, int | None]] = [(d.t_surface, i) for i, d in enumerate(told)]
     ends = sorted([*ends, *((t, None) for t in untold)], key=lambda end: end[0])
     surfaced = [t for t, _ in ends] + ([under_way.end] if under_way is not None else [])
     out, waiting = list(told), []
     for report, k in zip(reports, pair(reports, surfaced), strict=True):
+        part = next((i for a, b, i in flights if a + SPARSE < report.t < b - CURRENT_EARLY), None)
+        if part is not None:
+            if part < 0:
+                waiting.append(report)
+            else:
+                out[part] = _in_parts(out[part])
+            continue
         i = ends[k][1] if 0 <= k < len(ends) else None
         if k == len(ends):
             waiting.append(report)
-        elif i is not None and out[i].unusable is not Unusable.STALE_FIX:
+        elif (
+            i is not None
+            and out[i].unusable is not Unusable.STALE_FIX
+            and not out[i].features.surfacing_unseen
+        ):
             out[i] = replace(out[i], current=updated(out[i].current, report, out[i].t_surface))
     return out, waiting
+
+
+def _in_parts(dive: Dive) -> Dive:
+    """A dive in which the glider surfaced without a fix."""
+    if dive.features.surfacing_unseen:
+        return dive
+    note = "it surfaced without a fix on the way: the currents reported are those of parts of the dive"
+    features = replace(dive.features, surfacing_unseen=True)
+    return replace(dive, current=None, features=features, notes=(*dive.notes, note))

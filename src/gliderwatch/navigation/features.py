@@ -9,16 +9,21 @@ from statistics import median
 import numpy as np
 
 from gliderwatch.model import DiveFeatures, Series, Track
-from gliderwatch.navigation.flight import SPARSE, Flight
+from gliderwatch.navigation.constants import (
+    DEPTHS_FOR_DEEPEST,
+    DEPTHS_FOR_RATES,
+    DIVING_DEPTH,
+    FEW_RATES,
+    FEW_SAMPLES,
+    LEAST_RATE,
+    PUMPED,
+    RATE_INTERVAL,
+    SPARSE,
+    STEEP_PITCH,
+)
+from gliderwatch.navigation.flight import Flight
 from gliderwatch.navigation.samples import Samples, get
-from gliderwatch.navigation.track import Closure, mean_heading
-
-FEW = 3
-"""Samples in a dive that say how much the thruster was on, or the pump moved."""
-STEEP = 0.1
-"""rad: pitch of a glider that dives or climbs and does not turn."""
-PUMPED = 20e-6
-"""m3: a pump that moved less is on its way."""
+from gliderwatch.navigation.track import Closure, has_reckoning, mean_heading
 
 
 def evidence(features: DiveFeatures, closed: Closure | None = None) -> dict[str, float]:
@@ -36,6 +41,9 @@ def evidence(features: DiveFeatures, closed: Closure | None = None) -> dict[str,
         "heading_steadiness": f.heading_steadiness,
         "heading_mean": None if mean is None else degrees(mean) % 360,
         "heading_commanded": f.heading_commanded or None,
+        "heading_reckoned": float(f.heading_reckoned) or None,
+        "heading_assumed": float(f.heading_assumed) or None,
+        "surfacing_unseen": float(f.surfacing_unseen) or None,
         "depth_max": f.depth_max,
         "pitch_dive": f.pitch_dive,
         "pitch_climb": f.pitch_climb,
@@ -64,6 +72,9 @@ def track_features(samples: Samples, flight: Flight, track: Track) -> DiveFeatur
     mean, flown = mean_heading(track)
     commanded = get(samples, "commanded").between(flight.start, flight.end)
     headings = get(samples, "heading_e").between(flight.start, flight.end)
+    reckoned = get(samples, "reckoned").between(flight.start, flight.end)
+    unmeasured = len(commanded) > 0 or len(reckoned) > 0 or not len(headings)
+    shaped = unmeasured and has_reckoning(samples, flight)
     return replace(
         flight_features(samples, flight),
         fix_gap=float(track.t[-1]) - flight.end,
@@ -71,7 +82,9 @@ def track_features(samples: Samples, flight: Flight, track: Track) -> DiveFeatur
         ground_speed=float(np.hypot(*track.x[-1])) / interval,
         heading_steadiness=float(np.hypot(*mean)) * interval / max(flown, 1.0),
         heading_mean=atan2(mean[0], mean[1]),
-        heading_commanded=len(commanded) / len(headings) if len(commanded) else 0.0,
+        heading_commanded=len(commanded) / len(headings) if len(commanded) and not shaped else 0.0,
+        heading_reckoned=shaped,
+        heading_assumed=unmeasured and not shaped and not len(commanded),
     )
 
 
@@ -83,8 +96,8 @@ def flight_features(samples: Samples, flight: Flight) -> DiveFeatures:
     )
     ballast_dive, ballast_climb = _volumes(samples, flight)
     depth_rate_dive, depth_rate_climb = _depth_rates(depth)
-    well_sampled = len(depth) > 3 and np.diff(depth.t).max() < SPARSE
-    dives, climbs = pitch.v[pitch.v < -STEEP], pitch.v[pitch.v > STEEP]
+    well_sampled = len(depth) >= DEPTHS_FOR_DEEPEST and np.diff(depth.t).max() < SPARSE
+    dives, climbs = pitch.v[pitch.v < -STEEP_PITCH], pitch.v[pitch.v > STEEP_PITCH]
     return DiveFeatures(
         duration=flight.end - flight.start,
         depth_max=float(depth.v.max()) if well_sampled else None,
@@ -93,7 +106,7 @@ def flight_features(samples: Samples, flight: Flight) -> DiveFeatures:
         roll_mean=float(np.mean(roll.v)) if len(roll) else None,
         roll_std=float(np.std(roll.v)) if len(roll) else None,
         onboard_speed=float(np.mean(speed.v)) if len(speed) else None,
-        thruster=float(np.mean(thruster.v)) if len(thruster) >= FEW else None,
+        thruster=float(np.mean(thruster.v)) if len(thruster) >= FEW_SAMPLES else None,
         depth_rate_dive=depth_rate_dive,
         depth_rate_climb=depth_rate_climb,
         yos=_yos(pitch),
@@ -105,7 +118,7 @@ def flight_features(samples: Samples, flight: Flight) -> DiveFeatures:
 
 def _yos(pitch: Series) -> int | None:
     """How often the glider turned from dive to climb."""
-    steep = pitch.v[np.abs(pitch.v) > STEEP]
+    steep = pitch.v[np.abs(pitch.v) > STEEP_PITCH]
     return int(np.sum((steep[:-1] < 0) & (steep[1:] > 0))) or None
 
 
@@ -114,17 +127,19 @@ def _volumes(samples: Samples, flight: Flight) -> tuple[float | None, float | No
     moved = max((get(samples, name) for name in ("ballast", "oil_volume")), key=len)
     v = moved.between(flight.start, flight.end).v
     # the pump has moved most of the time: what lies between is it moving
-    return _median(v[v < -PUMPED].tolist(), FEW), _median(v[v > PUMPED].tolist(), FEW)
+    return _median(v[v < -PUMPED].tolist(), FEW_SAMPLES), _median(v[v > PUMPED].tolist(), FEW_SAMPLES)
 
 
 def _depth_rates(depth: Series) -> tuple[float | None, float | None]:
-    """Median rates of descent and climb (m/s) from depths at most 5 min apart, below the surface layer."""
-    if len(depth) < 6:
+    """Median rates of descent and climb (m/s) from depths close in time, below the surface."""
+    if len(depth) < DEPTHS_FOR_RATES:
         return None, None
     dt = np.diff(depth.t)
-    near = (dt > 0) & (dt < 300) & (np.minimum(depth.v[1:], depth.v[:-1]) > 3.0)
+    near = (dt > 0) & (dt < RATE_INTERVAL) & (np.minimum(depth.v[1:], depth.v[:-1]) > DIVING_DEPTH)
     rate = np.diff(depth.v)[near] / dt[near]
-    return _median(rate[rate > 0.02].tolist(), 2), _median(rate[rate < -0.02].tolist(), 2)
+    return _median(rate[rate > LEAST_RATE].tolist(), FEW_RATES), _median(
+        rate[rate < -LEAST_RATE].tolist(), FEW_RATES
+    )
 
 
 def _median(values: list[float], least: int) -> float | None:

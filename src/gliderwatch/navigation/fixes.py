@@ -9,14 +9,9 @@ from __future__ import annotations
 from math import cos, hypot, radians
 
 from gliderwatch.model import Fix
+from gliderwatch.navigation.constants import FASTEST_OVER_GROUND, SURFACE_STAY, SUSPECT_DISTANCE
 from gliderwatch.navigation.samples import Samples, get
 
-FASTEST = 3.0
-"""m/s over ground at the surface: more between two fixes close in time means that one is old or wild."""
-SURFACE_SPELL = 600.0
-"""Seconds: fixes closer in time than this are of one stay at the surface."""
-SUSPECT = 30.0
-"""Metres: a fix this near to the last one from before a dive may be the old one again."""
 _DEGREE = 111_195.0
 """Metres of a degree of a great circle."""
 
@@ -29,14 +24,14 @@ def distance(a: Fix, b: Fix) -> float:
 
 def _clash(a: Fix, b: Fix) -> bool:
     """Whether two fixes of one stay at the surface cannot both be right."""
-    return b.t - a.t < SURFACE_SPELL and distance(a, b) > FASTEST * (b.t - a.t) + SUSPECT
+    return b.t - a.t < SURFACE_STAY and distance(a, b) > FASTEST_OVER_GROUND * (b.t - a.t) + SUSPECT_DISTANCE
 
 
 def new_fixes(samples: Samples, last: Fix | None) -> list[Fix]:
     """The fixes of `samples` in order of time that are new, seen from the `last` good one.
 
     Left out: repeats of the value before, wild single values, and old values that the next fix
-    contradicts. A fix closer than `SUSPECT` to the one before a dive counts only once another
+    contradicts. A fix closer than `SUSPECT_DISTANCE` to the one before a dive counts only once another
     follows it.
     """
     kept = _consistent(_changed(samples, last))
@@ -78,7 +73,7 @@ def _consistent(fixes: list[Fix]) -> list[Fix]:
 
 def _agree(a: Fix | None, b: Fix | None) -> bool:
     """Whether both are fixes of one stay at the surface and both can be right."""
-    return a is not None and b is not None and b.t - a.t < SURFACE_SPELL and not _clash(a, b)
+    return a is not None and b is not None and b.t - a.t < SURFACE_STAY and not _clash(a, b)
 
 
 def stays(fixes: list[Fix], apart: float) -> list[tuple[Fix, Fix]]:
@@ -97,4 +92,4 @@ def stays(fixes: list[Fix], apart: float) -> list[tuple[Fix, Fix]]:
 
 
 def _may_be_old(last: Fix, fix: Fix) -> bool:
-    return fix.t - last.t > SURFACE_SPELL and distance(last, fix) < SUSPECT
+    return fix.t - last.t > SURFACE_STAY and distance(last, fix) < SUSPECT_DISTANCE

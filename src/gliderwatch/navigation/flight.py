@@ -8,18 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gliderwatch.model import EMPTY, Array, Series
+from gliderwatch.navigation.constants import (
+    DENIES_DIVE,
+    DIVING_DEPTH,
+    DIVING_PITCH,
+    MOSTLY_STEEP,
+    RECKONING_GROWS,
+)
 from gliderwatch.navigation.samples import Samples, get
 
-DIVING_DEPTH = 3.0
-"""Metres: deeper than the pitching of a glider at the surface in waves."""
-DIVING_PITCH = 0.2
-"""Radians: a glider glides steeper than this, and mostly lies flatter at the surface."""
-MOSTLY = 0.5
-"""Share of the pitches of a flight that are steep: all but those of the turns at top and bottom."""
-SPARSE = 1800.0
-"""Seconds: the coarsest cadence of a real-time file; samples further apart leave a hole."""
-DENIES = 600.0
-"""Seconds between two shallow depths: too short for a dive between them that is worth the name."""
 UNDERWATER = 1
 """Value of a Slocum's ``x_dr_state`` between its last fix before a dive and its surfacing."""
 
@@ -73,14 +70,15 @@ def lengthened(
 ) -> Flight:
     """The flight until the glider is at the surface again, if the files hold only its beginning.
 
-    Some tell of every third yo only. Where for longer than `DENIES` after what was seen there is no depth
-    (pitch, where depth is not sent) and no position, the flight goes on to the first of them: at the surface
-    a glider tells its position at once. Where a whole file is missing (``holes``, s) that cannot be said.
+    Some tell of every third yo only. Where for longer than `DENIES_DIVE` after what was seen there is no
+    depth (pitch, where depth is not sent) and no position, the flight goes on to the first of them: at the
+    surface a glider tells its position at once. Where a whole file is missing (``holes``, s) that cannot be
+    said.
     """
     told = "depth" if len(get(samples, "depth").between(flight.start, before)) else "pitch"
     times = np.concatenate([get(samples, told).t, get(samples, "fix_lat").t])
     end = float(np.min(times[times > flight.end], initial=before))
-    if end - flight.end <= DENIES or any(a < end and b > flight.end for a, b in holes):
+    if end - flight.end <= DENIES_DIVE or any(a < end and b > flight.end for a, b in holes):
         return flight
     return replace(flight, end=end)
 
@@ -104,7 +102,7 @@ def _mostly_steep(pitch: Series) -> Array:
     """Times of steep pitches, none where most of those between them are flat: a glider in waves."""
     steep = np.abs(pitch.v) > DIVING_PITCH
     at = np.flatnonzero(steep)
-    flies = len(at) > 0 and steep[at[0] : at[-1] + 1].mean() > MOSTLY
+    flies = len(at) > 0 and steep[at[0] : at[-1] + 1].mean() > MOSTLY_STEEP
     return pitch.t[at] if flies else pitch.t[:0]
 
 
@@ -116,12 +114,12 @@ def _reckoning(samples: Samples, after: float, before: float) -> Array | None:
     counted = get(samples, "dr_time").between(after, before)
     if not len(counted):
         return None
-    grows = np.diff(counted.v) > 0.5 * np.diff(counted.t)  # its last value stays for the time at the surface
+    grows = np.diff(counted.v) > RECKONING_GROWS * np.diff(counted.t)
     return np.asarray(counted.t[1:][grows])
 
 
 def _not_denied(t: Array, depth: Series, after: float, before: float) -> Array:
-    """Those of the times `t` that are not between two shallow depths at most `DENIES` apart.
+    """Those of the times `t` that are not between two shallow depths at most `DENIES_DIVE` apart.
 
     At the fixes before and after the glider is at the surface.
     """
@@ -130,5 +128,5 @@ def _not_denied(t: Array, depth: Series, after: float, before: float) -> Array:
     edges = np.concatenate([[after], depth.t, [before]])
     shallow = np.concatenate([[True], depth.v <= DIVING_DEPTH, [True]])
     i = np.clip(np.searchsorted(edges, t, "right"), 1, len(edges) - 1)
-    denied = shallow[i - 1] & shallow[i] & (edges[i] - edges[i - 1] <= DENIES)
+    denied = shallow[i - 1] & shallow[i] & (edges[i] - edges[i - 1] <= DENIES_DIVE)
     return np.asarray(t[~denied])

@@ -5,20 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from gliderwatch.model import DiveFeatures, Fix, Segment, Unusable
-from gliderwatch.navigation.fixes import FASTEST, distance
-from gliderwatch.navigation.flight import SPARSE, Flight
+from gliderwatch.navigation.clock import span
+from gliderwatch.navigation.constants import (
+    FASTEST_OVER_GROUND,
+    HEADING_GAP,
+    MOST_BLIND,
+    MOST_DRIFT,
+    MOST_UNOBSERVED,
+    STEADY_COURSE,
+    TURNED_MUCH,
+)
+from gliderwatch.navigation.fixes import distance
+from gliderwatch.navigation.flight import Flight
 from gliderwatch.navigation.samples import Samples, get
-from gliderwatch.navigation.track import CIRCLING
-
-UNOBSERVED = 0.25
-"""Share of the interval between two fixes that may be missing before a dive cannot be used."""
-BLIND = 0.8
-"""Share of a flight without any heading beyond which a dive cannot be used. Some files hold every
-third yo only: a glider on its way to a waypoint steers much the same in between."""
-STEADY = 0.9
-"""Length of the mean of the headings seen above which the glider is taken to have kept it in between."""
-SURFACE = 0.5
-"""Share of the interval between two fixes that the glider may have drifted before it cannot be used."""
 
 
 def why_unusable(
@@ -33,23 +32,30 @@ def why_unusable(
     if start is None:
         return Unusable.NO_FIX_BEFORE, "no fix before the dive"
     interval = end.t - start.t
-    if flight.evidence == "missing" or missing > UNOBSERVED * interval:
+    if flight.evidence == "missing" or missing > MOST_UNOBSERVED * interval:
         words = f"data missing: {missing / 3600:.1f} of {interval / 3600:.1f} h between two fixes"
         return Unusable.DATA_MISSING, words
-    if interval - flight.duration > SURFACE * interval:
+    if interval - flight.duration > MOST_DRIFT * interval:
         return Unusable.SURFACE_DRIFT, "mostly surface drift"
     over_ground = distance(start, end) / interval
-    if over_ground > FASTEST:
+    if over_ground > FASTEST_OVER_GROUND:
         return Unusable.WILD_FIX, f"wild fix: {over_ground:.0f} m/s over ground"
     return _blind(samples, flight)
 
 
 def _blind(samples: Samples, flight: Flight) -> tuple[Unusable | None, str]:
-    """Why the headings of a flight do not do, and the same in words; None and empty when they do."""
+    """Why the headings of a flight do not do, and the same in words; None and empty when they do, or when
+    depth or pitch tell how fast it was."""
+    return (None, "") if flight.evidence.startswith(("depth", "pitch")) else unsteered(samples, flight)
+
+
+def unsteered(samples: Samples, flight: Flight) -> tuple[Unusable | None, str]:
+    """Why the course of a flight is not known from its headings, and the same in words; None and empty when
+    it is."""
     gap = heading_gap(samples, flight)
-    if gap > BLIND * flight.duration:
+    if gap > MOST_BLIND * flight.duration:
         return Unusable.NO_HEADING, f"no heading for {gap / 3600:.1f} h"
-    if gap > 2 * SPARSE and _heading_length(samples, flight) < STEADY:
+    if gap > HEADING_GAP and _heading_length(samples, flight) < STEADY_COURSE:
         return Unusable.TURNING, f"turning, and no heading for {gap / 3600:.1f} h"
     return None, ""
 
@@ -69,12 +75,22 @@ def _heading_length(samples: Samples, flight: Flight) -> float:
 def segment_notes(segment: Segment, declination: float | None, from_model: bool) -> tuple[str, ...]:
     """Notes on the data of one segment; `declination` (rad) is the one used, perhaps `from_model`."""
     notes = [f"{n} values of {name} out of range dropped" for name, n in sorted(segment.dropped.items())]
+    notes += segment.notes
     if declination is None:
         notes.append("magnetic declination unknown: headings and currents are relative to magnetic north")
     elif from_model and segment.declination is not None:
         notes.append(f"magnetic declination from the model {segment.declination_source}")
-    if not len(segment.get("heading")) and len(segment.get("heading_commanded")):
-        notes.append("commanded heading used, the measured one is not in the file")
+    return tuple(notes)
+
+
+def corrected_notes(ahead: float, surface: float) -> tuple[str, ...]:
+    """Notes on a clock that was set ``ahead`` (s), and on a depth sensor that shows ``surface`` (m) at the
+    surface; 0: neither."""
+    notes = []
+    if ahead:
+        notes.append(f"the glider's clock was set forward by {span(ahead)}, or it stayed at the surface")
+    if surface:
+        notes.append(f"depth is {surface:.1f} m at the surface: taken off (the pressure was not zeroed)")
     return tuple(notes)
 
 
@@ -83,8 +99,14 @@ def flight_notes(flight: Flight, features: DiveFeatures) -> tuple[str, ...]:
     notes = []
     if flight.evidence == "heading":
         notes.append("no depth or pitch in the file: drift at the surface cannot be told from flight")
-    if features.heading_steadiness is not None and features.heading_steadiness < max(CIRCLING, 0.5):
+    if features.heading_steadiness is not None and features.heading_steadiness < TURNED_MUCH:
         notes.append("the glider turned much: its speed is hardly observable")
+    if features.heading_reckoned:
+        notes.append("no measured heading in the file: direction of the dead-reckoned way used")
+    if features.heading_commanded:
+        notes.append("commanded heading used, the measured one is not in the file")
+    if features.heading_assumed:
+        notes.append("headings missing: a steady course is assumed, in the direction that the current leaves")
     if features.heading_gap is not None:
         notes.append(f"no heading for {features.heading_gap / 3600:.1f} h of the dive: taken as steady")
     if features.unobserved:

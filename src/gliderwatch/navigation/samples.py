@@ -10,17 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gliderwatch.model import EMPTY, Array, Segment, Series, readonly
-from gliderwatch.navigation.frame import heading_vectors, magnetic_to_true
+from gliderwatch.navigation.constants import (
+    FASTEST_RECKONED,
+    FULL_POWER,
+    LONGEST_STEP,
+    SHORTEST_STEP,
+    SLOWEST_RECKONED,
+    SPACING,
+)
+from gliderwatch.navigation.frame import heading_vectors, magnetic_to_true, to_plane
 
 Samples = Mapping[str, Series]
 
-SPACING = 30.0
-"""Seconds: finer samples are averaged to this. A glider turns and pitches in minutes, and a
-checkpoint that carries a dive on to the next segment stays small also for 4 s data."""
 
-FULL_POWER = 24.0
-"""W of a thruster that is fully on: power goes with the square of the setting (electa-2022: 2.9 W at 35 %,
-8.6 W at 60 %)."""
 _VOLUMES = ("ballast", "oil_volume")
 _KEPT = ("pitch", "roll", "depth", "speed_onboard", "dr_state", "dr_time", "thruster_on", "vacuum", *_VOLUMES)
 _PAIRS = (("fix_lat", "fix_lon"), ("dr_lat", "dr_lon"))
@@ -73,10 +75,12 @@ def prepare(segment: Segment, declination: float) -> Samples:
     """What navigation needs of a segment; vectors relative to true north by `declination` (rad).
 
     Keys: ``fix_lat, fix_lon, dr_lat, dr_lon`` (degrees), ``heading_e, heading_n`` (unit vectors;
-    the commanded heading where the measured one is absent), ``pitch, roll`` (rad), ``depth`` (m),
+    the commanded heading where the measured one is absent, else the
+    direction of the dead-reckoned way), ``pitch, roll`` (rad), ``depth`` (m),
     ``speed_onboard`` (m/s), ``dr_state``, ``dr_time`` (s), ``thruster_on`` (0 to 1; by its power where the
     setting is absent), ``vacuum`` (Pa), ``ballast``, ``oil_volume`` (m3); ``commanded``, 1 at each heading
-    that is a commanded one.
+    that is a commanded one, ``reckoned`` at each that is a
+    direction of the dead-reckoned way.
     """
     source = "heading" if len(segment.get("heading")) else "heading_commanded"
     wanted = (*_KEPT, "thruster_power", source, *(name for pair in _PAIRS for name in pair))
@@ -89,11 +93,33 @@ def prepare(segment: Segment, declination: float) -> Samples:
         t, lat, lon = joined(given.get(pair[0], EMPTY), given.get(pair[1], EMPTY))
         _add(out, pair, t, np.stack([lat, lon], axis=-1))
     heading = given.get(source, EMPTY)
-    vectors = magnetic_to_true(heading_vectors(heading.v), declination)
-    _add(out, ("heading_e", "heading_n"), heading.t, vectors)
-    if source == "heading_commanded" and len(heading):
-        out["commanded"] = Series(heading.t, readonly(np.ones(len(heading))))
+    t, vectors = heading.t, magnetic_to_true(heading_vectors(heading.v), declination)
+    if source == "heading_commanded":
+        name = "commanded"
+        if not len(t):
+            name, (t, vectors) = "reckoned", _reckoned(out)
+        if len(t):
+            out[name] = Series(readonly(t), readonly(np.ones(len(t))))
+    _add(out, ("heading_e", "heading_n"), t, vectors)
     return MappingProxyType(out)
+
+
+def _reckoned(samples: Mapping[str, Series]) -> tuple[Array, NDArray[np.float64]]:
+    """Directions of the dead-reckoned way, for files without headings: times in the middle of steps, unit
+    vectors.
+
+    Steps to a fix, at the surface, are faster than any flight, or none at all.
+    """
+    lat, lon = samples.get("dr_lat", EMPTY), samples.get("dr_lon", EMPTY)
+    if len(lat) < 2:
+        return lat.t[:0], np.empty((0, 2))
+    dt = np.diff(lat.t)
+    step = np.diff(to_plane(lat.v, lon.v, float(lat.v[0]), float(lon.v[0])), axis=0)
+    speed = np.hypot(*step.T) / np.maximum(dt, 1e-3)
+    good = (
+        (dt >= SHORTEST_STEP) & (dt <= LONGEST_STEP) & (speed > SLOWEST_RECKONED) & (speed < FASTEST_RECKONED)
+    )
+    return (lat.t[1:] - dt / 2)[good], step[good] / (speed * dt)[good, None]
 
 
 def _add(out: dict[str, Series], names: tuple[str, str], t: Array, vectors: Array) -> None:

@@ -6,16 +6,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gliderwatch.model import Array, Current, Fix, Track, readonly
-from gliderwatch.navigation.fixes import FASTEST
-from gliderwatch.navigation.flight import SPARSE, Flight
+from gliderwatch.model import Array, Current, Fix, Series, Track, readonly
+from gliderwatch.navigation.constants import (
+    CIRCLING,
+    FASTEST_OVER_GROUND,
+    JUMP,
+    NOMINAL_SPEED,
+    RECKONED_GAP,
+    RECKONED_PART,
+    RECKONED_POSITIONS,
+    SPARSE,
+)
+from gliderwatch.navigation.flight import Flight
 from gliderwatch.navigation.frame import to_plane
 from gliderwatch.navigation.samples import Samples, get
-
-NOMINAL_SPEED = 0.3
-"""m/s: shapes a track where the glider reports no speed; the fixes correct its length."""
-CIRCLING = 0.1
-"""Length of the mean heading vector below which a mean direction means nothing."""
 
 
 def build_track(samples: Samples, flight: Flight, start: Fix, end: Fix) -> Track:
@@ -26,9 +30,11 @@ def build_track(samples: Samples, flight: Flight, start: Fix, end: Fix) -> Track
     alone and has no heading.
     """
     heading = get(samples, "heading_e").between(flight.start, flight.end)
-    inner = np.unique(np.concatenate([[flight.start, flight.end], heading.t]))
+    measured = len(heading) and not any(len(get(samples, name)) for name in ("commanded", "reckoned"))
+    shape = heading.t if measured else get(samples, "dr_lat").between(flight.start, flight.end).t
+    inner = np.unique(np.concatenate([[flight.start, flight.end], heading.t, shape]))
     t = np.unique(np.concatenate([[start.t], inner[(inner > start.t) & (inner < end.t)], [end.t]]))
-    vectors = _headings(samples, t, flight)
+    vectors = _headings(samples, t, flight, to_plane(end.lat, end.lon, start.lat, start.lon))
     reckoned = _onboard(samples, t, flight, start)
     if reckoned is None:
         steps = vectors * np.diff(t)[:, None] * _speed(samples, flight)
@@ -38,9 +44,18 @@ def build_track(samples: Samples, flight: Flight, start: Fix, end: Fix) -> Track
     return Track(readonly(t), readonly(x), readonly(vectors))
 
 
-def _headings(samples: Samples, t: Array, flight: Flight) -> Array:
-    """Unit vectors between successive times of `t`, zero outside the flight."""
+def _headings(samples: Samples, t: Array, flight: Flight, moved: Array) -> Array:
+    """Unit vectors between successive times of `t`, zero outside the flight.
+
+    Where no heading is known at all the course is taken for steady, along the way over ground ``moved`` (m,
+    (2,)): the estimator puts its own direction in place of that.
+    """
     middle = (t[1:] + t[:-1]) / 2
+    if not len(get(samples, "heading_e").between(flight.start, flight.end)):
+        way = float(np.hypot(*moved))
+        course = moved / way if way > 1.0 else np.array([1.0, 0.0])
+        flown = (middle >= flight.start) & (middle <= flight.end)
+        return np.asarray(np.where(flown[:, None], course, 0.0))
     e, n = get(samples, "heading_e").between(flight.start, flight.end), get(samples, "heading_n")
     n = n.between(flight.start, flight.end)
     vectors = np.stack([np.interp(middle, e.t, e.v), np.interp(middle, n.t, n.v)], axis=-1)
@@ -54,21 +69,36 @@ def _speed(samples: Samples, flight: Flight) -> float:
     return float(np.mean(speed.v)) if len(speed) else NOMINAL_SPEED
 
 
+def has_reckoning(samples: Samples, flight: Flight) -> bool:
+    """Whether the glider's own dead reckoning gives the shape of a flight."""
+    return _reckoning(samples, flight) is not None
+
+
+def _reckoning(samples: Samples, flight: Flight) -> tuple[Series, Series] | None:
+    """The glider's own positions on a flight; None if too sparse, or if they jump to a fix."""
+    lat = get(samples, "dr_lat").between(flight.start, flight.end)
+    lon = get(samples, "dr_lon").between(flight.start, flight.end)
+    if len(lat) < RECKONED_POSITIONS:
+        return None
+    gaps, covered = np.diff(lat.t), float(lat.t[-1] - lat.t[0])
+    if covered < RECKONED_PART * flight.duration or gaps.max() > max(SPARSE, RECKONED_GAP * flight.duration):
+        return None
+    xy = to_plane(lat.v, lon.v, float(lat.v[0]), float(lon.v[0]))
+    if (np.hypot(*np.diff(xy, axis=0).T) > FASTEST_OVER_GROUND * gaps + JUMP).any():
+        return None
+    return lat, lon
+
+
 def _onboard(samples: Samples, t: Array, flight: Flight, start: Fix) -> Array | None:
     """The glider's own dead reckoning at times `t`, from 0 at the start of the flight; None if too sparse.
 
     Before its first and after its last position the glider is taken to go on at the mean rate.
     """
-    lat = get(samples, "dr_lat").between(flight.start, flight.end)
-    lon = get(samples, "dr_lon").between(flight.start, flight.end)
-    if len(lat) < 4:
+    found = _reckoning(samples, flight)
+    if found is None:
         return None
-    gaps, covered = np.diff(lat.t), float(lat.t[-1] - lat.t[0])
-    if covered < 0.8 * flight.duration or gaps.max() > max(SPARSE, 0.2 * flight.duration):
-        return None
-    xy = to_plane(lat.v, lon.v, start.lat, start.lon)
-    if (np.hypot(*np.diff(xy, axis=0).T) > FASTEST * gaps + 100.0).any():
-        return None  # it jumps to a fix within the flight: no dead reckoning
+    lat, lon = found
+    covered, xy = float(lat.t[-1] - lat.t[0]), to_plane(lat.v, lon.v, start.lat, start.lon)
     rate = (xy[-1] - xy[0]) / covered
     first = xy[0] - rate * (lat.t[0] - flight.start)
     last = xy[-1] + rate * (flight.end - lat.t[-1])

@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from gliderwatch.model import Incident, Kind, Severity
+from gliderwatch.rules.constants import WORSE_FLOW_ERROR, WORSE_SPEED
 from gliderwatch.rules.incident import departure, is_severe
 
-MARGINS = {Kind.ANOMALY: 0.05, Kind.FALSE_ALARM: 0.1}
+MARGINS = {Kind.ANOMALY: WORSE_SPEED, Kind.FALSE_ALARM: WORSE_FLOW_ERROR}
 """How much further out of the ordinary than when it was acknowledged counts as worse: m/s out of the normal
 range, or flow error p_E."""
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from math import ceil
 from types import MappingProxyType
 from typing import Protocol
 
@@ -17,15 +18,10 @@ from gliderwatch.model import Alert, Assessment, Expected, Incident
 from gliderwatch.rules.aborts import Episode
 from gliderwatch.rules.acknowledged import Acks
 from gliderwatch.rules.calls import Empty
+from gliderwatch.rules.constants import FLOW_CHANGE, MARKS, NEWS, SLACK, SPEED_CHANGE, WEEK
 from gliderwatch.rules.overdue import Silence
 from gliderwatch.rules.unknown import Unknown
 
-NEWS = 86400.0
-"""Seconds: an incident that was over for longer when it became known is history, not news."""
-SPEED_CHANGE = 0.05
-"""m/s: a smaller change of a speed that was told is not worth a correction."""
-FLOW_CHANGE = 0.05
-"""m/s: the same for the reference flow."""
 NO_ACKS: Acks = MappingProxyType({})
 
 
@@ -48,7 +44,8 @@ class Said:
 
     ``surfaced`` is the surfacing of the last notice (s), ``silences`` what was told of its staying away
     (`rules.overdue`), ``unknown`` of dives that could not be judged (`rules.unknown`), ``aborts`` of aborts
-    (`rules.aborts`), ``empty`` of calls without a file (`rules.calls`).
+    (`rules.aborts`), ``empty`` of calls without a file (`rules.calls`), ``irregularities`` the ids of those
+    of its files.
     """
 
     threads: tuple[Thread, ...] = ()
@@ -57,6 +54,7 @@ class Said:
     unknown: Unknown | None = None
     aborts: tuple[Episode, ...] = ()
     empty: Empty | None = None
+    irregularities: tuple[str, ...] = ()
 
 
 class Known(Protocol):
@@ -208,7 +206,8 @@ def _begun(
     alerts = [replace(alert, incident=identity)]
     thread = Thread(identity, incident, incident.last, 1, latest.t_surface)
     if incident.cleared_at is not None:
-        thread, more = _told(thread, incident, _clearing(incident, known), latest, "all_clear")
+        others = _still_open(incident, known)
+        thread, more = _told(thread, incident, _clearing(incident, known), latest, "all_clear", others=others)
         alerts += more
     return thread, alerts
 
@@ -231,14 +230,26 @@ def _continued(
         return replace(told, withdrawn=True), alerts
     was_clear, is_clear = thread.told.cleared_at is not None, now.cleared_at is not None
     if is_clear and not was_clear and not thread.withdrawn:
-        return _told(thread, now, _clearing(now, known), latest, "all_clear")
+        return _told(thread, now, _clearing(now, known), latest, "all_clear", others=_still_open(now, known))
     moved = now.since != thread.told.since or now.cleared_at != thread.told.cleared_at
     if moved or thread.withdrawn or _changed(thread.dive, dive):
         return _told(thread, now, dive, latest, "correction", _why(thread, dive))
-    hours = (latest.t_surface - thread.time) / 3600
-    if not is_clear and reminder_hours is not None and hours >= reminder_hours:
-        return _told(thread, now, latest, latest, "reminder")
+    if not is_clear and reminder_hours is not None:
+        before, age = ((t - now.opened_at) / 3600 / reminder_hours for t in (thread.time, latest.t_surface))
+        if age >= next_reminder(before):
+            return _told(thread, now, latest, latest, "reminder")
     return thread, []
+
+
+def next_reminder(age: float) -> float:
+    """The age (days, or what is set in their place) at which an incident is brought to mind that was last
+    told of at an ``age``: at 1, 2, 4 and 7 days, then each week, and never within a day of that.
+
+    >>> [next_reminder(age) for age in (0.0, 0.5, 1.0, 2.1, 4.2, 7.0)]
+    [1.0, 2.0, 2.0, 4.0, 7.0, 14.0]
+    """
+    soonest = age + 1 - SLACK
+    return next((mark for mark in MARKS if mark >= soonest), WEEK * max(ceil(soonest / WEEK), 1))
 
 
 def _changed(told: Assessment, now: Assessment) -> bool:
@@ -260,15 +271,26 @@ def _why(thread: Thread, now: Assessment) -> str:
     return "data that came late changed the dives before"
 
 
+def _still_open(incident: Incident, known: Known) -> tuple[Incident, ...]:
+    """The other incidents of the glider that go on."""
+    return tuple(i for i in known.incidents() if i.id != incident.id and i.cleared_at is None)
+
+
 def _told(
-    thread: Thread, now: Incident | None, dive: Assessment, latest: Assessment, what: str, why: str = ""
+    thread: Thread,
+    now: Incident | None,
+    dive: Assessment,
+    latest: Assessment,
+    what: str,
+    why: str = "",
+    others: tuple[Incident, ...] = (),
 ) -> tuple[Thread, list[Alert]]:
     """The thread after one more message, about a `dive`, and the message."""
     alert_id, audience = f"{thread.id}/{thread.messages}", thread.told.severity
     if what == "correction":
         alert = message.correction(thread.told, now, dive, why, alert_id=alert_id, audience=audience)
     elif what == "all_clear" and now is not None:
-        alert = message.all_clear(now, dive, alert_id=alert_id, audience=audience)
+        alert = message.all_clear(now, dive, alert_id=alert_id, audience=audience, others=others)
     else:
         assert now is not None
         hours = (dive.t_surface - now.since) / 3600

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from gliderwatch.alerts import calls as message
 from gliderwatch.model import Alert, Call, Severity
 from gliderwatch.rules.aborts import NEWS
-from gliderwatch.rules.silence import COMMUNICATION, HOUR, Sign
+from gliderwatch.rules.constants import LONGEST_CALL
+from gliderwatch.rules.silence import HOUR, Sign
 
 SEVERAL = 2
 """Calls without a file in a row that are a warning; one alone may be a dropped connection."""
@@ -50,7 +51,7 @@ def _is_one(before: list[Call], call: Call) -> bool:
         return False
     fix = next((c.fix for c in reversed(before) if c.fix is not None), None)
     if fix is None or call.fix is None:
-        return pause <= COMMUNICATION
+        return pause <= LONGEST_CALL
     return abs(fix.lat - call.fix.lat) <= _PLACE and abs(fix.lon - call.fix.lon) <= _PLACE
 
 
@@ -102,7 +103,7 @@ def _over(glider: str, before: Empty | None, groups: list[Surfacing]) -> tuple[E
 def _is_over(surfacing: Surfacing, now: float) -> bool:
     """Whether a surfacing has ended: its last connection, and no further one is to come soon."""
     last = surfacing[-1]
-    return now - last.last_t > COMMUNICATION or (last.over and not last.calls_back)
+    return now - last.last_t > LONGEST_CALL or (last.over and not last.calls_back)
 
 
 def _is_in_mission(surfacing: Surfacing) -> bool:

@@ -12,6 +12,7 @@ from enum import StrEnum
 
 from gliderwatch.model import Assessment, Flag, Incident, Kind
 from gliderwatch.params import AnomalyRule, FalseAlarmRule, RuleParams
+from gliderwatch.rules.constants import SEVERE, SURELY, WELL
 
 
 class Phase(StrEnum):
@@ -81,20 +82,37 @@ def judge(state: Watches, dive: Assessment, rules: RuleParams) -> tuple[Watches,
     """The state after one more dive, and the incidents that it opened, carried on or cleared."""
     if dive.flag is None:
         return state, ()
-    anomaly, first = _watch(state.anomaly, dive, Kind.ANOMALY, _says_of_anomaly(dive), rules.anomaly)
+    is_open = state.anomaly.incident is not None
+    anomaly, first = _watch(state.anomaly, dive, Kind.ANOMALY, _says_of_anomaly(dive, is_open), rules.anomaly)
+    before = state.false_alarm
+    if anomaly.incident is not None:
+        # one fault is one incident: a slow glider explains what was taken for a wrong measurement
+        over = () if before.incident is None else (replace(before.incident, cleared_at=dive.t_surface),)
+        return Watches(anomaly, Watch()), first + over
     false_alarm, second = _watch(
-        state.false_alarm, dive, Kind.FALSE_ALARM, dive.flag == Flag.FALSE_ALARM, rules.false_alarm
+        before, dive, Kind.FALSE_ALARM, dive.flag == Flag.FALSE_ALARM, rules.false_alarm
     )
     return Watches(anomaly, false_alarm), first + second
 
 
-def _says_of_anomaly(dive: Assessment) -> bool | None:
-    return None if dive.flag == Flag.FALSE_ALARM else dive.flag == Flag.ANOMALY
+def _says_of_anomaly(dive: Assessment, is_open: bool) -> bool | None:
+    """Whether a dive is flagged (None: it says neither). An open anomaly is cleared by dives near the usual
+    speed: one just inside the bound is not well again."""
+    if dive.flag == Flag.FALSE_ALARM:
+        return None
+    usual, speed = dive.evidence.get("usual_speed"), dive.speed
+    if is_open and dive.flag == Flag.NORMAL and usual is not None and speed is not None:
+        near = dive.speed_min + WELL * (usual - dive.speed_min)
+        return None if speed < near else False
+    return dive.flag == Flag.ANOMALY
 
 
 def is_severe(dive: Assessment) -> bool:
-    """Whether the speed is below half of the lower bound of the normal range."""
-    return dive.speed is not None and dive.speed < dive.speed_min / 2
+    """Whether the speed is below half of the lower bound of the normal range, and surely below that bound."""
+    if dive.speed is None:
+        return False
+    sigma = dive.evidence.get("speed_sigma", 0.0)
+    return dive.speed < SEVERE * dive.speed_min and dive.speed + SURELY * sigma < dive.speed_min
 
 
 def departure(dive: Assessment, kind: Kind) -> float:

@@ -8,13 +8,14 @@ at what changed, so that nothing is said twice and the order of arrival does not
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Protocol
 
 from gliderwatch.alerts import overdue as message
 from gliderwatch.alerts.overdue import Absence, Fleet
 from gliderwatch.model import Alert, Assessment, Expected, Incident, Severity
+from gliderwatch.rules.constants import GONE, LATER_CALL, MESSAGE_LATE, RECENT
 from gliderwatch.rules.silence import (
-    GONE,
     Awaited,
     Sign,
     awaited,
@@ -26,17 +27,15 @@ from gliderwatch.rules.silence import (
     severity,
 )
 
-LATE = 900.0
-"""Seconds: a message made later than that after its time tells of now (the service was off), an earlier one
-of its time, so that live and replay say the same."""
-RECENT = GONE + 2 * 86400.0
-"""Seconds: files opened before are no sign of life of the last 30 days."""
-
 
 @dataclass(frozen=True, slots=True)
 class Silence:
     """The messages of one silence: the call that was ``awaited``, how often it was ``told`` to be overdue,
-    ``messages`` so far; ``called`` when it was heard again (s), ``withdrawn`` if that was in time."""
+    ``messages`` so far; ``called`` when it was heard again (s), ``withdrawn`` if that was in time.
+
+    ``shore`` is the id of the silence whose message was for all gliders because none called: its own, or that
+    of another glider. Then this one has no message of its own before its next stage.
+    """
 
     id: str
     awaited: Awaited
@@ -44,6 +43,7 @@ class Silence:
     messages: int
     called: float | None = None
     withdrawn: bool = False
+    shore: str = ""
 
 
 class Known(Protocol):
@@ -67,7 +67,7 @@ class Known(Protocol):
         """Whether a dive began at `since` (s) or later, also one that has not ended or cannot be used."""
 
     def signs(self, since: float) -> tuple[Sign, ...]:
-        """Its files that were opened at `since` (s) or later."""
+        """Its files that were opened at `since` (s) or later, or that came since."""
 
 
 def hear(silences: tuple[Silence, ...], known: Known, now: float) -> tuple[tuple[Silence, ...], list[Alert]]:
@@ -87,6 +87,8 @@ def _heard(before: Silence, known: Known, now: float) -> tuple[Silence, Alert | 
     at = first_call(call, known.signs(call.heard - RECENT), known.first_surfacing(call.heard), now)
     if at is None or (before.called is not None and at > call.due):
         return before, None
+    if not before.messages:  # nobody was told of this one
+        return replace(before, called=at, withdrawn=at <= call.due), None
     silence = replace(before, messages=before.messages + 1, called=at, withdrawn=at <= call.due)
     identity, to = f"{before.id}/{before.messages}", _audience(before)
     if silence.withdrawn:
@@ -95,7 +97,14 @@ def _heard(before: Silence, known: Known, now: float) -> tuple[Silence, Alert | 
         )
     dive = known.last_surfacing(now)
     return silence, message.called(
-        known.glider, call.heard, at, dive, alert_id=identity, thread=before.id, to=to
+        known.glider,
+        call.heard,
+        at,
+        dive,
+        alert_id=identity,
+        thread=before.id,
+        to=to,
+        shore=before.shore == before.id,
     )
 
 
@@ -106,16 +115,23 @@ def _audience(silence: Silence) -> Severity:
 def tick(
     silences: tuple[Silence, ...], known: Known, fleet: Fleet, overdue_hours: float | None, now: float
 ) -> tuple[tuple[Silence, ...], list[Alert]]:
-    """As `hear`, and what has become due by `now` (s)."""
+    """As `hear`, and what has become due by `now` (s).
+
+    Where no glider calls, the message of the first that is due is for all of them: the others have none of
+    their own while that goes on, nor for a margin after one calls again.
+    """
     silences, alerts = hear(silences, known, now)
     silence = _going_on(silences, known, overdue_hours, now)
     if silence is None or now - silence.awaited.heard >= GONE:
         return silences, alerts
     stages = silence.awaited.stages(now)
-    if stages <= silence.told:
+    if stages <= silence.told or now < _patience(silence, fleet.back):
         return silences, alerts
+    kept = tuple(s for s in silences if s.id != silence.id and (s.called is None or now - s.called < GONE))
+    if fleet.is_silent and fleet.shore and not silence.messages:
+        return (*kept, replace(silence, told=stages, shore=fleet.shore)), alerts
     since = silence.awaited.stage(stages - 1)
-    absence = _absence(silence.awaited, known, fleet, since if now - since < LATE else now)
+    absence = _absence(silence.awaited, known, fleet, since if now - since < MESSAGE_LATE else now)
     alert = message.overdue(
         absence,
         alert_id=f"{silence.id}/{silence.messages}",
@@ -123,24 +139,36 @@ def tick(
         severity=severity(stages - 1),
         first=silence.messages == 0,
     )
-    told = replace(silence, told=stages, messages=silence.messages + 1)
-    kept = (s for s in silences if s.id != silence.id and (s.called is None or now - s.called < GONE))
+    shore = silence.id if fleet.is_silent else ""
+    told = replace(silence, told=stages, messages=silence.messages + 1, shore=shore)
     return (*kept, told), [*alerts, alert]
 
 
 def next_tick(
-    silences: tuple[Silence, ...], known: Known, overdue_hours: float | None, now: float
+    silences: tuple[Silence, ...],
+    known: Known,
+    overdue_hours: float | None,
+    now: float,
+    back: float | None = None,
 ) -> float | None:
-    """When `tick` has something to say next (s) if nothing is heard until then; None: never."""
+    """When `tick` has something to say next (s) if nothing is heard until then; None: never. `back` is as in
+    `Fleet`."""
     silence = _going_on(silences, known, overdue_hours, now)
-    return None if silence is None else silence.awaited.stage(silence.told)
+    return None if silence is None else max(silence.awaited.stage(silence.told), _patience(silence, back))
+
+
+def _patience(silence: Silence, back: float | None) -> float:
+    """Until when (s) a glider of a fleet that was silent as a whole may take to call, once the first has."""
+    call = silence.awaited
+    return -inf if back is None or not silence.shore else back + call.due - call.t
 
 
 def outlook(known: Known, now: float) -> tuple[Expected, tuple[Sign, ...]] | None:
     """What is expected of a glider in the water at `now` (s), and its signs of life; None: nothing."""
     signs = known.signs(now - RECENT)
-    expected = known.expected(now) or guess(signs, now)
-    if expected is None or not is_launched(signs, known.has_dived(now - RECENT)):
+    recent = tuple(sign for sign in signs if sign.opened_at >= now - RECENT)
+    expected = known.expected(now) or guess(recent, now)
+    if expected is None or not is_launched(recent, known.has_dived(now - RECENT)):
         return None
     return expected, signs
 
@@ -171,7 +199,7 @@ def _absence(call: Awaited, known: Known, fleet: Fleet, now: float) -> Absence:
         expected = Expected(call.heard, call.t, 0.0, None, None, 0.0, 0.0, 0.0, "")
     place = _both(last.lat, last.lon) if last is not None else None
     flow = _both(*message.current(last)) if last is not None else None
-    foreseen = expected if call.heard <= expected.after + call.interval / 2 else None
+    foreseen = expected if call.heard <= expected.after + LATER_CALL * call.interval else None
     return Absence(
         glider=known.glider,
         now=now,

@@ -16,30 +16,29 @@ from statistics import median_low
 import numpy as np
 
 from gliderwatch.alerts.overdue import Area, Fleet
+from gliderwatch.estimation.flow import FlowParams
+from gliderwatch.forecast.constants import CHI2_COVERED
 from gliderwatch.model import Expected, Severity
 from gliderwatch.navigation.frame import from_plane, to_plane
+from gliderwatch.rules.constants import (
+    FILES_KEPT,
+    FLOW_SIGMA,
+    FRESH,
+    GONE,
+    GUESSED_SIGMA,
+    LATER_CALL,
+    LEAST_MARGIN,
+    LONGEST_CALL,
+    LOSSY,
+    MARGIN_GROWTH,
+    SAME_CALL,
+    SHORTEST_INTERVAL,
+    TIME_SIGMAS,
+    UNKNOWN_FLOW,
+)
 
 HOUR = 3600.0
-LEAST_MARGIN = 3 * HOUR
-"""Seconds by which a healthy glider may be late."""
-COMMUNICATION = 2400.0
-"""Seconds that a call takes at the most: its files come when it ends, not at the surfacing."""
-KEPT = 8
-"""Files from which the interval is guessed where dives do not tell it."""
-LOSSY = 3.0
-"""Intervals from file to file, above which it was a silence and not one or two files that were lost."""
-SIGMAS = 3.0
-"""Standard errors of the expected time that belong to the margin."""
-FRESH = 2 * 86400.0
-"""Seconds: a file that came longer after its end is history, no news of a glider at sea."""
-GONE = 30 * 86400.0
-"""Seconds of silence after which a deployment counts as over."""
-FLOW_SIGMA = 0.15
-"""m/s, a component: how far current and wind drift come to differ from the last known current. 0.11 is
-sqrt(2) times the 0.08 of the current itself; the rest is allowed for the wind at the surface."""
-FLOW_MEMORY = 30 * HOUR
-"""Seconds over which the current forgets."""
-_K95 = sqrt(5.991)
+_K95 = sqrt(CHI2_COVERED)
 """Semi-axes of the 95 % ellipse in standard deviations (chi-square, 2 degrees of freedom)."""
 
 
@@ -52,6 +51,16 @@ class Sign:
     last_t: float | None
     at: float
     is_call: bool = False
+
+    def life(self, interval: float, watched: float) -> float:
+        """When the glider was alive by this file, whatever its clock says.
+
+        A file that came days after its date, when the glider was heard since `watched` (s), has a wrong clock
+        or was sent once more: either way it was sent now. An archive that is read at the first start
+        is history.
+        """
+        t = self.time(interval)
+        return self.at if self.at - t > FRESH and self.at - watched > interval else t
 
     def time(self, interval: float) -> float:
         """When the glider sent it, at the latest: after its last sample, one `interval` after its opening
@@ -72,7 +81,7 @@ class Awaited:
 
     def stage(self, k: int) -> float:
         """When it becomes overdue for the k-th time (s)."""
-        return float(self.t + (self.due - self.t) * 2.0**k)
+        return float(self.t + (self.due - self.t) * MARGIN_GROWTH**k)
 
     def stages(self, now: float) -> int:
         """How often it has become overdue."""
@@ -89,14 +98,14 @@ def margin(expected: Expected, signs: Iterable[Sign], now: float, overdue_hours:
         return overdue_hours * HOUR
     interval = expected.t - expected.after
     usual = rhythm(signs, now, LOSSY * interval) or interval
-    return max(LEAST_MARGIN, SIGMAS * expected.t_sigma, interval, usual) + COMMUNICATION
+    return max(LEAST_MARGIN, TIME_SIGMAS * expected.t_sigma, interval, usual) + LONGEST_CALL
 
 
 def rhythm(signs: Iterable[Sign], now: float, longest: float = inf) -> float | None:
     """Seconds from one file that comes to the next, usually: with the stay at the surface, and with the file
     between them where every other one is lost. After ``longest`` it is a silence. None: too few known."""
-    opened = sorted(s.opened_at for s in signs if s.opened_at <= now and not s.is_call)[-KEPT:]
-    gaps = [b - a for a, b in pairwise(opened) if COMMUNICATION / 2 < b - a < longest]
+    opened = sorted(s.opened_at for s in signs if s.opened_at <= now and not s.is_call)[-FILES_KEPT:]
+    gaps = [b - a for a, b in pairwise(opened) if SHORTEST_INTERVAL < b - a < longest]
     return median_low(gaps) if len(gaps) > 1 else None
 
 
@@ -109,7 +118,9 @@ def guess(signs: Iterable[Sign], now: float) -> Expected | None:
         return None
     last = max(s.opened_at for s in known)
     after = max((t for t in (s.time(interval) for s in known) if t <= now), default=last)
-    return Expected(after, after + interval, interval / 2, None, None, 0.0, 0.0, 0.0, "its last files")
+    return Expected(
+        after, after + interval, GUESSED_SIGMA * interval, None, None, 0.0, 0.0, 0.0, "its last files"
+    )
 
 
 def awaited(expected: Expected, signs: Iterable[Sign], now: float, overdue_hours: float | None) -> Awaited:
@@ -119,9 +130,11 @@ def awaited(expected: Expected, signs: Iterable[Sign], now: float, overdue_hours
     cache, a dive without a fix) puts the next one off: one interval from there.
     """
     signs, interval = tuple(signs), expected.t - expected.after
-    heard = max([expected.after, *(t for t in (s.time(interval) for s in signs) if t <= now)])
-    t = heard + interval if heard > expected.after + interval / 2 else expected.t
-    return Awaited(heard, t, t + margin(expected, signs, now, overdue_hours), interval)
+    watched = min((s.at for s in signs), default=now)
+    heard = max([expected.after, *(t for t in (s.life(interval, watched) for s in signs) if t <= now)])
+    t = heard + interval if heard > expected.after + LATER_CALL * interval else expected.t
+    recent = (s for s in signs if now - s.opened_at <= GONE + FRESH)
+    return Awaited(heard, t, t + margin(expected, recent, now, overdue_hours), interval)
 
 
 def is_at_sea(signs: Iterable[Sign], interval: float, now: float) -> bool:
@@ -146,8 +159,9 @@ def first_call(after: Awaited, signs: Iterable[Sign], surfacing: float | None, n
 
     What belongs to the call last heard may come up to a quarter of an interval later.
     """
-    late = after.heard + after.interval / 4
-    times = [s.time(after.interval) for s in signs] + ([] if surfacing is None else [surfacing])
+    late, signs = after.heard + SAME_CALL * after.interval, tuple(signs)
+    watched = min((s.at for s in signs), default=now)
+    times = [s.life(after.interval, watched) for s in signs] + ([] if surfacing is None else [surfacing])
     return min((t for t in times if (t > late or t == surfacing) and t <= now), default=None)
 
 
@@ -173,7 +187,7 @@ def drift(
 
     It drifts with the last known `flow` (east, north; m/s) from where it was expected, since then. The
     ellipse also reaches to where it would be, had it drifted since its last fix, at `place` (degrees). It
-    grows as the integral of an Ornstein-Uhlenbeck process of `FLOW_SIGMA` and `FLOW_MEMORY`.
+    grows as the integral of an Ornstein-Uhlenbeck process of `FLOW_SIGMA` and the memory of a current.
     """
     u = np.array(flow if flow is not None else (0.0, 0.0))
     if expected.lat is not None and expected.lon is not None:
@@ -187,9 +201,10 @@ def drift(
     else:
         return None
     elapsed = max(now - since, 0.0)
-    r = elapsed / FLOW_MEMORY
-    spread = FLOW_SIGMA if flow is not None else 2 * FLOW_SIGMA
-    cov = cov + 2 * (spread * FLOW_MEMORY) ** 2 * (r - 1 + exp(-r)) * np.eye(2)
+    memory = FlowParams().memory
+    r = elapsed / memory
+    spread = FLOW_SIGMA if flow is not None else UNKNOWN_FLOW * FLOW_SIGMA
+    cov = cov + 2 * (spread * memory) ** 2 * (r - 1 + exp(-r)) * np.eye(2)
     values, vectors = np.linalg.eigh(cov)
     east, north = vectors[:, 1]
     lat, lon = from_plane(u * elapsed, *origin)

@@ -16,18 +16,16 @@ from typing import Protocol
 from gliderwatch.alerts import unknown as message
 from gliderwatch.alerts.unknown import Blindness, Unjudged
 from gliderwatch.model import Alert, Expected, Unusable
+from gliderwatch.navigation.constants import SHORTEST_DIVE
 from gliderwatch.params import Attention
-from gliderwatch.rules.silence import GONE, HOUR, Sign, is_at_sea, rhythm
-
-USUAL_HOURS = 24.0
-"""Hours that tell two deployments apart where `unknown_hours` is not given."""
-SHORTEST = 900.0
-"""Seconds: what is shorter is no dive (as in `navigation.dives`) but a file of tests on deck."""
-INTERVALS = 2.0
-"""Intervals between surfacings until a dive is judged, at most: the fix that ends it, and its current,
-come with the file after it."""
-THINNED = 7.0
-"""Reminders come after 1, 2 and 4 times `reminder_hours`, then each time after so many of them."""
+from gliderwatch.rules.constants import (
+    DEPLOYMENT_HOURS,
+    GONE,
+    REMINDER_GROWTH,
+    THINNED,
+    UNJUDGED_INTERVALS,
+)
+from gliderwatch.rules.silence import HOUR, Sign, is_at_sea, rhythm
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +76,7 @@ def blindness(known: Known, attention: Attention, now: float) -> Blindness | Non
 
 def _apart(attention: Attention) -> float:
     """Seconds without anything of a glider after which what comes belongs to another deployment."""
-    return HOUR * (USUAL_HOURS if attention.unknown_hours is None else attention.unknown_hours)
+    return HOUR * (DEPLOYMENT_HOURS if attention.unknown_hours is None else attention.unknown_hours)
 
 
 def _run(items: Iterable[Unjudged], apart: float, now: float) -> tuple[Unjudged, ...]:
@@ -106,7 +104,9 @@ def _is_long(items: tuple[Unjudged, ...], expected: Expected | None, attention: 
     if dives is not None and _dives(items) >= dives:
         return True
     interval = 0.0 if expected is None else expected.t - expected.after
-    return hours is not None and _end(items) - items[0].start >= max(hours * HOUR, INTERVALS * interval)
+    return hours is not None and _end(items) - items[0].start >= max(
+        hours * HOUR, UNJUDGED_INTERVALS * interval
+    )
 
 
 def _dives(items: tuple[Unjudged, ...]) -> int:
@@ -116,7 +116,7 @@ def _dives(items: tuple[Unjudged, ...]) -> int:
     """
     has_files = any(item.is_file for item in items)
     return sum(
-        item.end - item.start >= SHORTEST and not (has_files and item.cause is Unusable.DATA_MISSING)
+        item.end - item.start >= SHORTEST_DIVE and not (has_files and item.cause is Unusable.DATA_MISSING)
         for item in items
     )
 
@@ -135,7 +135,7 @@ def announce(
         return replace(before, messages=before.messages + 1, time=at, is_over=True), [alert]
     if found is None or reminder_hours is None:
         return before, []
-    pause = min(2.0 ** (before.messages - 1), THINNED) * reminder_hours * HOUR
+    pause = min(REMINDER_GROWTH ** (before.messages - 1), THINNED) * reminder_hours * HOUR
     if found.until - before.time < pause:
         return before, []
     alert = message.blind(found, alert_id=identity, thread=before.id, first=False)

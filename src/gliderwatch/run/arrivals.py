@@ -7,9 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from gliderwatch.errors import MissingCache, NotAssessed, Quarantine, Retry
-from gliderwatch.ingest.caches import find_cache
+from gliderwatch.ingest.caches import is_there
 from gliderwatch.ingest.calls import Dialog, read_log
 from gliderwatch.ingest.header import read_header
+from gliderwatch.ingest.science import needs_science, science_files
 from gliderwatch.ingest.settle import Settling
 from gliderwatch.model import Hindrance
 from gliderwatch.run.backlog import Job
@@ -46,17 +47,45 @@ def settle_anew(path: Path, settling: Settling, now: float) -> None:
     observe(path, settling, now)
 
 
+def lacks_depth(flight: Path, store: Store, caches: Sequence[Path]) -> bool:
+    """Whether a flight file that was looked at before, and is as it was, names no sensor of the depth."""
+    before = store.file(_text(flight))
+    if before is None or (before.size, before.mtime_ns) != state(flight):
+        return False
+    try:
+        return needs_science(read_header(flight), caches)
+    except (Quarantine, Retry):
+        return False
+
+
+def newer_science(flight: Path, store: Store) -> list[Path]:
+    """The science files beside a flight file that came after it was looked at, by this machine's clock."""
+    noted = store.noted_at(_text(flight))
+    if noted is None:
+        return []
+    try:
+        return [path for path in science_files(flight) if path.stat().st_ctime > noted]
+    except OSError:
+        return []
+
+
 def judge(
-    path: Path, store: Store, caches: Sequence[Path], is_known: Callable[[str], bool]
+    path: Path,
+    store: Store,
+    caches: Sequence[Path],
+    is_known: Callable[[str], bool],
+    *,
+    anew: bool = False,
 ) -> Job | File | None:
     """A job where the file is to be decoded, a row for the ledger where not, None where nothing is new.
 
-    Reads nothing but the header, which takes well under a millisecond.
+    Reads nothing but the header, which takes well under a millisecond. `anew`: also one that is done with.
     """
     now, before = state(path), store.file(_text(path))
     if now is None:
         return _gone(before, store, is_known)
-    if before is not None and (before.size, before.mtime_ns) == now and _is_settled(before, caches, is_known):
+    is_same = before is not None and (before.size, before.mtime_ns) == now
+    if before is not None and is_same and not anew and _is_settled(before, caches, is_known):
         return None
     file = File(_text(path), *now, Status.WAITING)
     try:
@@ -137,7 +166,7 @@ def _gone(before: File | None, store: Store, is_known: Callable[[str], bool]) ->
         return None
     if before.status == Status.UNKNOWN and not is_known(before.glider):
         return None
-    if store.segments.completeness(before.glider, before.segment) is None:
+    if not store.segments.is_held(before.glider, before.segment):
         reason = "is not there any more, and its segment has not come under another name"
         return replace(before, status=Status.WAITING, reason=reason, crc="", hindrance=Hindrance.GONE)
     return replace(before, status=Status.DUPLICATE, reason="was renamed", crc="", hindrance=Hindrance.RENAMED)
@@ -146,7 +175,7 @@ def _gone(before: File | None, store: Store, is_known: Callable[[str], bool]) ->
 def _is_missing(crc: str, caches: Sequence[Path]) -> bool:
     """Whether a cache file is in none of the folders; where one cannot be read, the decoder tells why."""
     try:
-        return find_cache(crc, caches) is None
+        return not is_there(crc, caches)
     except OSError:
         return False
 

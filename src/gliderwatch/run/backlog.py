@@ -17,12 +17,21 @@ AHEAD = 16
 
 @dataclass(slots=True)
 class Job:
-    """A file to decode, ``begun`` (s, monotonic); ``result`` is there once it is decoded or has failed."""
+    """A file to decode, ``begun`` (s, monotonic); ``result`` is there once it is decoded or has failed.
+
+    ``offset`` is what is to be added to the glider's clock (s), as far as headers tell.
+    """
 
     file: File
     header: Header
     result: Segment | Exception | None = None
     begun: float | None = None
+    offset: float = 0.0
+
+    @property
+    def opened_at(self) -> float:
+        """When the file was opened (s), by a clock that is right."""
+        return self.header.id.opened_at + self.offset
 
 
 @dataclass(slots=True)

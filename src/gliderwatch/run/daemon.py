@@ -20,8 +20,8 @@ import structlog
 
 from gliderwatch.config import Config, load
 from gliderwatch.errors import ConfigError, DamagedError, GliderwatchError
-from gliderwatch.ingest.watch import CacheChanged, EventsLost, FileChanged
-from gliderwatch.run import arrivals, heartbeat, intake, notify, recovery
+from gliderwatch.ingest.watch import CacheChanged, EventsLost, FileChanged, ScienceChanged
+from gliderwatch.run import arrivals, intake, notify, preconditions, recovery
 from gliderwatch.run.heartbeat import Upkeep
 from gliderwatch.run.life import BEAT, Life
 from gliderwatch.run.parts import Decoded, News, Parts, build
@@ -48,6 +48,9 @@ class Daemon:
     def __init__(self, config: Config, config_path: Path, workers: int = 2) -> None:
         self._config_path, self._workers = config_path, workers
         self._state = Path(config.state.path)
+        preconditions.require(
+            config, config_path
+        )  # before anything is made beside what may be another's file
         self._life = Life(self._state)
         self._store = recovery.open_state(config)
         self._trouble = Trouble(self._store, self._is_stopping)
@@ -68,6 +71,7 @@ class Daemon:
         self._upkeep.use(parts.config)
         self._settled: deque[Path] = deque()
         self._caught_up = self._retry = False
+        self._calm_in: float | None = None
         self._next_scan = self._next_beat = time.monotonic()
         # files that came while nobody watched settle first
         self._next_tick = self._next_scan + parts.config.dockserver.settle_seconds + 1.0
@@ -132,6 +136,7 @@ class Daemon:
             self._parts.feed()  # all that came together is in order of time before the first is taken
         if not self._settled:
             self._catch_up()
+        self._calm_in = self._reception.speak_when_calm(time.monotonic())
         if self._caught_up and time.monotonic() >= self._next_tick:
             self._tick()
         if self._is_idle():
@@ -146,6 +151,7 @@ class Daemon:
         due = [self._next_scan - now, self._next_beat - now, BEAT if settled is None else settled]
         due += [self._next_tick - now] if self._caught_up else []
         due += [self._retention.pause(now)] if self._is_idle() else []
+        due += [self._calm_in] if self._calm_in is not None else []
         return max(0.0, min(due))
 
     def _is_idle(self) -> bool:
@@ -166,7 +172,7 @@ class Daemon:
             return
         if isinstance(news, Decoded):
             self._reception.decoded(news)
-        elif isinstance(news, FileChanged):
+        elif isinstance(news, FileChanged | ScienceChanged):
             arrivals.observe(news.path, self._parts.settling, time.monotonic())
         elif isinstance(news, CacheChanged):
             self._retry = True
@@ -198,6 +204,9 @@ class Daemon:
                 return
             there.add(found.path)
             settling.observe(found.path, found.size, found.mtime_ns, time.monotonic())
+            if not self._caught_up:  # science files that came while nobody watched
+                for path in arrivals.newer_science(found.path, self._store):
+                    arrivals.observe(path, settling, time.monotonic())
         settling.only(there)
         took = time.monotonic() - begun  # where it takes long there is to be time for more than rescans
         self._next_scan = begun + took + max(took, self._parts.config.dockserver.rescan_seconds)
@@ -208,7 +217,7 @@ class Daemon:
     def _retry_waiting(self) -> None:
         """Look again at the files that wait; one that has changed since has to settle first."""
         self._retry = False
-        self._parts.decoder.cache_folders = self._parts.watcher.cache_folders()
+        self._parts.decoder.cache_folders = self._parts.cache_folders()
         for file in self._store.files(Status.WAITING, Status.UNKNOWN):
             path = Path(file.path)
             if arrivals.state(path) in (None, (file.size, file.mtime_ns)):
@@ -227,7 +236,11 @@ class Daemon:
     def _tick(self) -> None:
         """Say which gliders are overdue, and look again when the next may be."""
         gliders, speaking = sorted(self._parts.config.gliders), self._parts.speaking
-        now, is_busy = time.monotonic(), self._parts.backlog.more
+        now, backlog, reception = time.monotonic(), self._parts.backlog, self._reception
+
+        def is_busy(glider: str) -> bool:
+            return backlog.more(glider) or not reception.is_calm(glider)
+
         alerts, pause = self._ticking.tick(gliders, speaking, is_busy, time.time(), now)
         self._next_tick = now + pause
         self._reception.alerted(alerts)
@@ -260,7 +273,7 @@ class Daemon:
             config = load(self._config_path)
             if Path(config.state.path) != self._state:
                 raise ConfigError("state.path can only be changed by a restart")
-            heartbeat.url(config)
+            preconditions.require(config, self._config_path)
             parts = build(config, self._news, self._wake, self._workers, before)
         except GliderwatchError as error:
             log.error("configuration refused, the old one is kept", path=path, reason=str(error))

@@ -85,7 +85,7 @@ class Heartbeat:
         """As configured. Raises ConfigError where the URL cannot be used."""
         settings = config.heartbeat
         file = Path(settings.file) if settings.file is not None else None
-        return cls(file, url(config), settings.minutes * 60.0)
+        return cls(file, address(config), settings.minutes * 60.0)
 
     def beat(self, now: float) -> None:
         """All is well at `now` (monotonic, s): give a sign if one is due."""
@@ -110,44 +110,40 @@ class Heartbeat:
                 log.warning("heartbeat not given", reason=reason)
 
 
-def fetch(address: str) -> str | None:
+def fetch(url: str) -> str | None:
     """Fetch a URL; what went wrong, in words without its secrets, None when nothing did."""
-    request = urllib.request.Request(address, headers={"User-Agent": f"gliderwatch/{__version__}"})
+    request = urllib.request.Request(url, headers={"User-Agent": f"gliderwatch/{__version__}"})
     try:
         with urllib.request.urlopen(request, timeout=ANSWER) as answer:
             answer.read(1)
     except (OSError, HTTPException, ValueError) as error:  # a refusal (HTTPError) is an OSError too
-        return scrub(f"{urlsplit(address).hostname}: {str(error) or type(error).__name__}", address)
+        return scrub(f"{urlsplit(url).hostname}: {str(error) or type(error).__name__}", url)
     return None
 
 
-def url(config: Config) -> str | None:
+def address(config: Config) -> str | None:
     """The URL to fetch with its references filled in. Raises ConfigError where it cannot be used."""
     template = config.heartbeat.url
     if template is None:
         return None
-    where = f"heartbeat.url (line {config.locate('heartbeat.url')})"
+    found = references.resolve(template.get_secret_value(), config.folder)
     try:
-        address = references.resolve(template.get_secret_value(), config.folder)
-        parts = urlsplit(address)
+        parts = urlsplit(found)
         usable = parts.scheme in {"http", "https"} and bool(parts.hostname) and parts.port != 0
-    except (ConfigError, ValueError) as error:
-        reason = str(error) if isinstance(error, ConfigError) else "is no URL"
-        raise ConfigError(f"{where}: {reason}") from None
+    except ValueError:
+        raise ConfigError("is no URL") from None
     if not usable:
-        raise ConfigError(f"{where}: must be an http or https URL")
-    return address
+        raise ConfigError("must be an http or https URL")
+    return found
 
 
 class Upkeep:
     """All that looks after the daemon itself; used in its thread.
 
-    Made from a configuration and the store of the daemon; `use` comes before all else. Raises ConfigError
-    where the URL of the heartbeat cannot be used.
+    Made from a configuration and the store of the daemon; `use` comes before all else.
     """
 
     def __init__(self, config: Config, store: Store) -> None:
-        url(config)  # a bad one is told before anything starts
         state = Path(config.state.path)
         self._store = store
         self._operator = Operator(store, state, config, time.time(), time.monotonic())

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
+from gliderwatch.alerts.overdue import Fleet
 from gliderwatch.currents.field import Field
 from gliderwatch.errors import GliderwatchError, NotAssessed
 from gliderwatch.ingest.calls import Dialog
 from gliderwatch.model import Alert, Assessment, Segment, SegmentId
 from gliderwatch.params import Attention, GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
-from gliderwatch.rules import aborts, overdue, silence, unknown
+from gliderwatch.rules import aborts, irregularities, overdue, silence, unknown
 from gliderwatch.rules import calls as without_files
 from gliderwatch.rules.announce import Said, due
+from gliderwatch.rules.constants import GONE
 from gliderwatch.rules.muting import with_mute
-from gliderwatch.rules.silence import GONE
+from gliderwatch.rules.waiting import AT_ONCE, Wait
 from gliderwatch.run.posting import post_alerts, withdraw_answered
 from gliderwatch.store.codec import plain_encode
 from gliderwatch.store.sqlite import File, Known, Status, Store
@@ -65,7 +67,7 @@ def take(
     glider = segment.id.glider
     with store.transaction():
         store.hear(segment.id, segment.last_t, now)
-        known = store.segments.completeness(glider, segment.id.name)
+        known = store.segments.completeness(segment.id)
         if known is not None and known >= segment.completeness:
             file = replace(file, status=Status.DUPLICATE, reason="this segment is known from a fuller copy")
             store.note(file, now)
@@ -126,13 +128,53 @@ def tick(
     if due_at is None or due_at > now:
         return ()
     with store.transaction():
-        outlooks = (overdue.outlook(store.known(other), now) for other in others)
-        fleet = silence.fleet(filter(None, outlooks), now)
         said, hours = store.said(glider), speaking.attention(glider).overdue_hours
+        fleet = replace(_fleet(store, others, now), back=_back(store, said.silences))
         silences, alerts = overdue.tick(said.silences, store.known(glider), fleet, hours, now)
         if silences != said.silences:
-            post_alerts(store, glider, replace(said, silences=silences), alerts, speaking.channels, now)
+            channels = _channels(store, silences, speaking)
+            post_alerts(store, glider, replace(said, silences=silences), alerts, channels, now)
     return tuple(alerts)
+
+
+def _fleet(store: Store, others: Iterable[str], now: float) -> Fleet:
+    """How the others at sea are, and whether a message about one of them was for all."""
+    outlooks = {other: overdue.outlook(store.known(other), now) for other in others}
+    at_sea = {o: x for o, x in outlooks.items() if x is not None and silence.fleet([x], now).others}
+    shore = (s.id for o in at_sea for s in store.said(o).silences if s.called is None and s.shore == s.id)
+    found = silence.fleet(at_sea.values(), now)
+    return replace(found, names=tuple(sorted(at_sea)), shore=next(shore, ""))
+
+
+def _back(store: Store, silences: Iterable[overdue.Silence]) -> float | None:
+    """When the first glider called (s) after a time in which none did and of which one of these silences is
+    part; None: none has, or none is."""
+    shores = {s.shore for s in silences if s.shore and s.called is None}
+    if not shores:
+        return None
+    fleet = (s for other in store.gliders() for s in store.said(other).silences if s.shore in shores)
+    return min((s.called for s in fleet if s.called is not None), default=None)
+
+
+def _channels(
+    store: Store, silences: Iterable[overdue.Silence], speaking: Speaking
+) -> Callable[[Alert], Iterable[str]]:
+    """The channels of an alert; of one that is for all gliders, those of the alerts of each."""
+    for_all = {s.id for s in silences if s.shore == s.id}
+
+    def channels(alert: Alert) -> Iterable[str]:
+        if alert.incident not in for_all:
+            return speaking.channels(alert)
+        merged: dict[str, list[Wait]] = {}
+        for glider in store.gliders():
+            if not speaking.attention(glider).recovered:
+                found = speaking.channels(replace(alert, glider=glider))
+                waits = found if isinstance(found, Mapping) else dict.fromkeys(found, AT_ONCE)
+                for name, wait in waits.items():
+                    merged.setdefault(name, []).extend(wait)
+        return merged
+
+    return channels
 
 
 def next_tick(store: Store, glider: str, speaking: Speaking, now: float) -> float | None:
@@ -140,7 +182,9 @@ def next_tick(store: Store, glider: str, speaking: Speaking, now: float) -> floa
     attention = with_mute(speaking.attention(glider), store.notes.muted_until(glider))
     if attention.recovered:
         return None
-    at = overdue.next_tick(store.said(glider).silences, store.known(glider), attention.overdue_hours, now)
+    silences = store.said(glider).silences
+    known, hours = store.known(glider), attention.overdue_hours
+    at = overdue.next_tick(silences, known, hours, now, _back(store, silences))
     return at if at is None or attention.muted_until is None else max(at, attention.muted_until)
 
 
@@ -205,9 +249,11 @@ def _speak(
         store.notes.acks(glider),
     )
     blind, more = unknown.announce(said.unknown, known, attention, params.rules.reminder_hours, now)
-    said, alerts = replace(said, unknown=blind), [*heard, *alerts, *more]
+    ids, notices = irregularities.due(before.irregularities, known.irregularities(now), now)
+    said = replace(said, unknown=blind, irregularities=ids)
+    alerts = [*heard, *notices, *alerts, *more]
     said, more = _speak_of_calls(said, known, now)
     alerts += more
     if said != before or alerts:
-        post_alerts(store, glider, said, alerts, speaking.channels, now)
+        post_alerts(store, glider, said, alerts, _channels(store, before.silences, speaking), now)
     return tuple(alerts)

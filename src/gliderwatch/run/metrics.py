@@ -20,8 +20,8 @@ from gliderwatch.alerts.outbox import Delivery
 from gliderwatch.config import Config
 from gliderwatch.config.service import Metrics as Settings
 from gliderwatch.model import Assessment
-from gliderwatch.rules.overdue import RECENT
-from gliderwatch.rules.silence import GONE, awaited
+from gliderwatch.rules.constants import GONE, RECENT
+from gliderwatch.rules.silence import awaited
 from gliderwatch.run.life import STALE
 from gliderwatch.store.sqlite import File, Status, Store
 from gliderwatch.store.watch_health import last_files, outbox_since

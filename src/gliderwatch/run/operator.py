@@ -15,11 +15,11 @@ from gliderwatch.alerts.words import duration, utc
 from gliderwatch.config import Config
 from gliderwatch.config.service import Operator as Settings
 from gliderwatch.model import Alert, Severity
+from gliderwatch.rules.constants import GONE
 from gliderwatch.rules.muting import with_mute
 from gliderwatch.rules.overdue import outlook
-from gliderwatch.rules.silence import GONE
 from gliderwatch.run.posting import post_alert
-from gliderwatch.run.speaking import Waits, waits
+from gliderwatch.run.speaking import Waits, operators, waits
 from gliderwatch.store.sqlite import Store
 from gliderwatch.store.watch_health import (
     Failing,
@@ -149,12 +149,9 @@ def over(key: str) -> str:
 def channels(config: Config, audience: Severity, key: str) -> Waits:
     """The channels of those who hear of a trouble, but not the one that it is about.
 
-    They are the operators; where there are none, all who want messages of this severity. A trouble cannot be
-    acknowledged: it waits for quiet hours alone.
+    A trouble cannot be acknowledged: it waits for quiet hours alone.
     """
-    recipients = list(config.recipients.values())
-    chosen = [r for r in recipients if r.operator] or [r for r in recipients if audience >= r.min_severity]
-    found = waits(chosen, can_be_acknowledged=False)
+    found = waits(operators(config, audience), can_be_acknowledged=False)
     return {name: wait for name, wait in found.items() if key != f"{CHANNEL}/{name}"}
 
 

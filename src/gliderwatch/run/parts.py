@@ -15,6 +15,7 @@ from gliderwatch.alerts.channels import Channel
 from gliderwatch.alerts.outbox import Dispatcher
 from gliderwatch.config import Config
 from gliderwatch.ingest.decode import Decoder
+from gliderwatch.ingest.lists import SensorLists, lists_folder
 from gliderwatch.ingest.settle import Settling
 from gliderwatch.ingest.watch import Change, Watcher
 from gliderwatch.model import Segment
@@ -54,6 +55,7 @@ class Parts:
     settling: Settling
     watcher: Watcher
     decoder: Decoder
+    lists: SensorLists
     backlog: Backlog
     dispatcher: Dispatcher
     ocean: Ocean
@@ -72,6 +74,10 @@ class Parts:
             self.decoder.close()
         if after is None or after.dispatcher is not self.dispatcher:
             self.dispatcher.stop()
+
+    def cache_folders(self) -> tuple[Path, ...]:
+        """Where sensor lists are now: the cache folders, then the lists that came inside of files."""
+        return (*self.watcher.cache_folders(), self.lists.folder)
 
     def feed(self) -> None:
         """Keep the decoder busy, with no more than it can take."""
@@ -108,12 +114,10 @@ def build(
         logs=config.dockserver.logs,
     )
     ocean, speaks = Ocean(config), speaking(config)
-    if before is None:
-        decoder = Decoder(watcher.cache_folders(), max_workers=workers)
-    else:  # shared: what follows can no longer refuse the configuration
-        decoder = before.decoder
-        decoder.cache_folders = watcher.cache_folders()
-    return Parts(
+    lists = SensorLists(lists_folder(Path(config.state.path)))
+    # shared: what follows can no longer refuse the configuration
+    decoder = Decoder((), max_workers=workers) if before is None else before.decoder
+    parts = Parts(
         config,
         news,
         workers,
@@ -121,8 +125,11 @@ def build(
         Settling(config.dockserver.settle_seconds),
         watcher,
         decoder,
+        lists,
         Backlog(),
         dispatcher,
         ocean,
         urls,
     )
+    decoder.cache_folders = parts.cache_folders()
+    return parts

@@ -12,6 +12,8 @@ import structlog
 
 from gliderwatch.errors import Quarantine, StateError
 from gliderwatch.ingest import names
+from gliderwatch.ingest.science import flight_files
+from gliderwatch.ingest.watch import CacheChanged
 from gliderwatch.model import Alert, Segment
 from gliderwatch.run import arrivals, intake, logs
 from gliderwatch.run.backlog import Job
@@ -21,6 +23,12 @@ from gliderwatch.run.parts import Decoded, Parts
 from gliderwatch.store.sqlite import File, Status, Store
 
 log = structlog.get_logger(__name__)
+
+CALM = 10.0
+"""Seconds without a further file after which it is said that an overdue glider calls again: of several that
+come at once only all together tell when it called."""
+LONGEST = 120.0
+"""Seconds after which that is said in any case."""
 
 
 class Reception:
@@ -35,25 +43,49 @@ class Reception:
     ) -> None:
         self._store, self._upkeep, self._wake, self._is_stopping = store, upkeep, wake, is_stopping
         self._heeded = time.time()
+        self._calm: dict[str, tuple[float, float]] = {}
 
     def use(self, parts: Parts) -> None:
         """Work with these parts; comes before all else."""
         self._parts = parts
 
     def judge(self, path: Path) -> None:
-        """Look at a file that has settled: it is queued for the decoder, or noted for what it is."""
+        """Look at a file that has settled: it is queued for the decoder, or noted for what it is.
+
+        Of a science file it is the flight file beside it that is looked at, anew, if it lacks the depth.
+        """
         if names.is_log(path.name):
             self._take_log(path)
             return
+        if not names.is_science(path.name):
+            self._judge(path)
+            return
+        for flight in flight_files(path):
+            if arrivals.lacks_depth(flight, self._store, self._parts.decoder.cache_folders):
+                self._judge(flight, anew=True)
+
+    def _judge(self, path: Path, *, anew: bool = False) -> None:
         caches = self._parts.decoder.cache_folders
-        found = arrivals.judge(path, self._store, caches, self._is_known)
+        found = arrivals.judge(path, self._store, caches, self._is_known, anew=anew)
         if isinstance(found, Job):
+            self._keep_list(path, found)
             self._upkeep.queued(found)
             self._parts.backlog.add(found)
         elif found is not None:
             self._note(found)
         if arrivals.state(path) is None:  # it may come back as it was: a share that was away
             self._parts.settling.forget(path)
+
+    def _keep_list(self, path: Path, job: Job) -> None:
+        """Keep the sensor list that a file holds: others that left it out may wait for it."""
+        try:
+            kept = self._parts.lists.keep(path, job.header)
+        except OSError as error:
+            log.warning("sensor list cannot be kept", path=str(path), crc=job.header.crc, reason=str(error))
+            return
+        if kept is not None:
+            log.info("sensor list kept", path=str(path), crc=job.header.crc)
+            self._parts.news.put(CacheChanged(kept))
 
     def decoded(self, news: Decoded) -> None:
         """Take the files of a glider that are decoded, in their order.
@@ -77,6 +109,20 @@ class Reception:
         """Say what an earlier life left unsaid of any glider."""
         for glider in self._store.gliders():
             self._speak(glider)
+
+    def speak_when_calm(self, monotonic: float) -> float | None:
+        """Say what is to be said of gliders that were overdue and of which no file came for a while; seconds
+        until the next may be due, None: there is none."""
+        waiting = {g: at for g, (at, _) in self._calm.items() if not self._parts.backlog.more(g)}
+        for glider in [g for g, at in waiting.items() if at <= monotonic]:
+            del self._calm[glider], waiting[glider]
+            if self._is_known(glider):
+                self._say(glider)
+        return min(waiting.values()) - monotonic if waiting else None
+
+    def is_calm(self, glider: str) -> bool:
+        """Whether nothing of a glider waits to be said."""
+        return glider not in self._calm
 
     def heed_mutes(self, now: float) -> None:
         """Say what there is to say of gliders whose mute has ended since the last time, by `now` (s)."""
@@ -120,6 +166,9 @@ class Reception:
             reason = "older than what state.keep_days keeps"
             self._note(replace(file, status=Status.DUPLICATE, reason=reason, opened_at=None))
             return
+        if self._gave_no_more(file, segment):
+            self._speak(glider)
+            return
         params, speaking = self._parts.config.glider(glider), self._speaking(glider)
         begun = time.monotonic()
         try:
@@ -148,6 +197,17 @@ class Reception:
         else:
             self.alerted(taken.alerts)
 
+    def _gave_no_more(self, file: File, segment: Segment) -> bool:
+        """Whether a file that was looked at anew, for what lies beside it, gave no more than before."""
+        before = self._store.file(file.path)
+        held = self._store.segments.completeness(segment.id)
+        return (
+            before is not None
+            and before.status == Status.TAKEN
+            and (before.size, before.mtime_ns) == (file.size, file.mtime_ns)
+            and held == segment.completeness
+        )
+
     def _note(self, file: File) -> None:
         """Write down what became of a file that is not taken (now), if that is new."""
         if self._store.file(file.path) == file:
@@ -157,16 +217,30 @@ class Reception:
         self._told(intake.note(self._store, file, params, speaking, time.time()))
 
     def _speaking(self, glider: str) -> Speaking | None:
-        """Who is told of a glider; None while more of its files are at hand: the last speaks for all."""
+        """Who is told of a glider; None while more of its files are at hand, or may be: the last speaks for
+        all."""
         last = self._is_known(glider) and not self._parts.backlog.more(glider)
-        return self._parts.speaking if last else None
+        return self._parts.speaking if last and not self._may_more_come(glider) else None
+
+    def _may_more_come(self, glider: str) -> bool:
+        """Whether it was told to be overdue: then a file may be the first of several that come at once."""
+        now, waiting = time.monotonic(), self._calm.get(glider)
+        if waiting is None:
+            silences = self._store.said(glider).silences
+            if not any(s.called is None and s.messages for s in silences):
+                return False
+        end = now + LONGEST if waiting is None else waiting[1]
+        self._calm[glider] = min(now + CALM, end), end
+        return True
 
     def _speak(self, glider: str) -> None:
         """Say what is to be said of a glider without a new file."""
-        speaking = self._speaking(glider)
-        if speaking is not None:
-            params = self._parts.config.glider(glider)
-            self.alerted(intake.speak(self._store, glider, params, speaking, time.time()))
+        if self._speaking(glider) is not None:
+            self._say(glider)
+
+    def _say(self, glider: str) -> None:
+        params = self._parts.config.glider(glider)
+        self.alerted(intake.speak(self._store, glider, params, self._parts.speaking, time.time()))
 
     def _told(self, taken: intake.Taken, seconds: float | None = None) -> None:
         logs.taken(taken)

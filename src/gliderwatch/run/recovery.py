@@ -16,6 +16,7 @@ from gliderwatch.model import Alert, Severity
 from gliderwatch.rules.waiting import NO_INCIDENT, deliveries
 from gliderwatch.run import logs, operator
 from gliderwatch.store import damage
+from gliderwatch.store.database import refuse_foreign
 from gliderwatch.store.sqlite import Store
 
 log = structlog.get_logger(__name__)
@@ -24,6 +25,7 @@ log = structlog.get_logger(__name__)
 def open_state(config: Config) -> Store:
     """The state of a configuration, in use by nobody else. Raises StateError where it cannot be used."""
     path = Path(config.state.path)
+    refuse_foreign(path)
     found = damage.damage(path)
     if found is not None:
         set_aside(path, found)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import tempfile
 import threading
 import time
@@ -19,9 +18,11 @@ from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine, Retry
 from gliderwatch.ingest import names
 from gliderwatch.ingest.decode import Decoder
 from gliderwatch.ingest.header import read_header
+from gliderwatch.ingest.lists import SensorLists, lists_folder
 from gliderwatch.model import Alert, Hindrance, Segment
+from gliderwatch.navigation.clock import Stamp, corrections, is_same, numbered
 from gliderwatch.params import GliderParams
-from gliderwatch.rules.silence import GONE
+from gliderwatch.rules.constants import GONE
 from gliderwatch.run import arrivals, intake
 from gliderwatch.run.backlog import Job
 from gliderwatch.run.intake import Speaking
@@ -31,12 +32,15 @@ from gliderwatch.run.ocean import Ocean
 from gliderwatch.run.replay_logs import Log, find_logs, read_logs
 from gliderwatch.run.speaking import NOBODY, speaking
 from gliderwatch.run.turns import Turns
-from gliderwatch.store.database import MEMORY
+from gliderwatch.store.database import MEMORY, refuse_foreign
 from gliderwatch.store.outbox import Outbox
-from gliderwatch.store.sqlite import Status, Store
+from gliderwatch.store.sqlite import File, Status, Store
 
 STATE = "replay.sqlite"
 """Name of the state file in the folder of results: another one than a daemon's usual."""
+ASSESSMENTS, ALERTS = "assessments.jsonl", "alerts.jsonl"
+WRITTEN = (ASSESSMENTS, ALERTS, STATE)
+"""All that is left in the folder of results."""
 SEND_PATIENCE = 120.0
 """Seconds that `--send` waits at the end for messages to be delivered."""
 
@@ -68,7 +72,8 @@ class Request:
 class Report:
     """What a replay found: files by status with reasons, and the store that holds the rest.
 
-    ``clock`` is what time it is for each glider (s): that of its data.
+    ``clock`` is what time it is for each glider (s): that of its data. ``coming`` is when its files were
+    opened that are not taken yet (s).
     """
 
     store: Store
@@ -76,6 +81,7 @@ class Report:
     files: Counter[Status] = field(default_factory=Counter)
     undelivered: int = 0
     clock: dict[str, float] = field(default_factory=dict)
+    coming: dict[str, deque[float]] = field(default_factory=dict)
 
 
 def replay(
@@ -93,16 +99,17 @@ def replay(
         where = ", ".join(map(str, request.folders))
         raise GliderwatchError(f"no flight data files (sbd, scd, mbd, mcd, dbd, dcd) or logs below {where}")
     on_total(len(files) + len(logs))
-    caches = cache_folders(request)
-    with _state(request) as path:
+    with _state(request) as path, tempfile.TemporaryDirectory(prefix="gliderwatch-") as kept:
+        lists = SensorLists(Path(kept))
         ocean = None if request.config is None else Ocean(request.config)
         report = Report(Store.open(path, durable=False), ocean)
         with _speaking(request, path, report) as told:
-            jobs = _triage(files, report, caches, request, on_file)
+            jobs = _triage(files, report, lists, request, on_file)
             calls = deque(read_logs(logs, report.store, request.is_wanted))
             _check_glider(request, jobs, calls, report.store)
+            report.coming = _coming(jobs, calls)
             turns = Turns(jobs)
-            for decoded in _decoded(jobs, caches, workers):
+            for decoded in _decoded(jobs, [*cache_folders(request), lists.folder], workers):
                 for job, sent in turns.after(decoded):
                     while calls and calls[0].sent <= sent:
                         _take_log(calls.popleft(), report, request, told, on_file)
@@ -115,21 +122,27 @@ def replay(
 
 
 def find_files(folders: Iterable[Path]) -> list[Path]:
-    """All flight data files below some folders, each once; links are followed, for who replays chose them."""
+    """All flight data files below some folders, each once.
+
+    The folders may be links. Below them a link is treated as the service does: a file that is one is named
+    and left alone, a folder that is one is not looked into.
+    """
     found = {
-        path.resolve() if path.is_symlink() else path: None
+        path: None
         for folder in folders
         for path in sorted([folder] if folder.is_file() else folder.rglob("*"))
-        if names.kind(path.name) is not None and not path.is_dir()
+        if names.kind(path.name) is not None and (path.is_symlink() or not path.is_dir())
     }
     return list(found)
 
 
 def cache_folders(request: Request) -> list[Path]:
-    """The cache folders named and configured, the folders replayed, and any `cache` in or beside them."""
+    """The cache folders named and configured, the folders replayed, any `cache` in or beside them, and the
+    lists that the service of the configuration has kept."""
     folders = [*request.caches]
     if request.config is not None:
         folders += expand(request.config.dockserver.cache)
+        folders.append(lists_folder(Path(request.config.state.path)))
     for folder in request.folders:
         around = [
             folder,
@@ -156,6 +169,7 @@ def _fresh(path: Path, config: Config | None) -> Path:
     """A state file of which nothing is there: what an earlier replay left is removed."""
     if alive_path(path).exists() or (config is not None and path.resolve() == Path(config.state.path)):
         raise GliderwatchError(f"{path} is the state of a daemon: choose another folder for --out")
+    refuse_foreign(path, "Choose another folder for --out")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         for old in (path, *path.parent.glob(f"{path.name}-*")):
@@ -201,24 +215,64 @@ def _at_once(config: Config) -> Speaking:
 def _triage(
     files: Sequence[Path],
     report: Report,
-    caches: Sequence[Path],
+    lists: SensorLists,
     request: Request,
     on_file: Callable[[intake.Taken], None],
 ) -> list[Job]:
-    """The files to decode in the order of time, the fullest copy of a segment first."""
-    jobs: list[Job] = []
-    for path in files:
+    """The files to decode in the order of time, the fullest copy of a segment first.
+
+    Those that leave their sensor list out are looked at last: any of the others may hold it.
+    """
+    caches = [*cache_folders(request), lists.folder]
+    jobs, noted = list[Job](), list[File]()
+
+    def look(path: Path) -> None:
         found = arrivals.judge(path, report.store, caches, request.is_wanted)
         if isinstance(found, Job):
+            lists.keep(path, found.header)
             jobs.append(found)
-        elif found is not None and found.hindrance is Hindrance.NO_CACHE:
-            # a sign of life of its time: it has its turn with the others
-            jobs.append(Job(found, read_header(path), MissingCache(found.crc, caches)))
         elif found is not None:
-            if found.status == Status.UNKNOWN and request.glider is not None:
-                found = replace(found, reason=f"of {found.glider}, not of {request.glider}")
-            _count(intake.note(report.store, found, GliderParams(), None, time.time()), report, on_file)
-    return sorted(jobs, key=lambda j: (j.header.id, -names.rank(j.header.kind), j.file.path))
+            noted.append(found)
+
+    for path in files:
+        look(path)
+    waiting, noted = [file for file in noted if file.crc], [file for file in noted if not file.crc]
+    for file in waiting:
+        look(Path(file.path))
+    for found in noted:
+        if found.hindrance is Hindrance.NO_CACHE:  # a sign of life: it has its turn with the others
+            jobs.append(Job(found, read_header(Path(found.path)), MissingCache(found.crc, caches)))
+        else:
+            _note(found, report, request, on_file)
+    _correct_clocks(jobs)
+    return sorted(jobs, key=lambda j: (j.opened_at, j.header.id, -names.rank(j.header.kind), j.file.path))
+
+
+def _correct_clocks(jobs: Sequence[Job]) -> None:
+    """Give the files of a glider whose clock fell back their turn: when they were sent, not years before."""
+    missions: dict[tuple[str, str], dict[str, list[list[Job]]]] = {}
+    for job in jobs:
+        mission = job.header.id.glider, numbered(job.header.id.name)[0]
+        segments = missions.setdefault(mission, {}).setdefault(job.header.id.name, [])
+        copies = next((s for s in segments if is_same(s[0].header.id, job.header.id)), None)
+        if copies is None:
+            segments.append([job])
+        else:
+            copies.append(job)
+    for by_name in missions.values():
+        segments = [copies for found in by_name.values() for copies in found]
+        opened = [(copies[0].header.id.name, copies[0].header.id.opened_at) for copies in segments]
+        stamps = [Stamp(numbered(name)[1], t, t) for name, t in opened]
+        for copies, correction in zip(segments, corrections(stamps), strict=True):
+            for job in copies:
+                job.offset = correction.offset
+
+
+def _note(file: File, report: Report, request: Request, on_file: Callable[[intake.Taken], None]) -> None:
+    """Write down a file that is not decoded."""
+    if file.status == Status.UNKNOWN and request.glider is not None:
+        file = replace(file, reason=f"of {file.glider}, not of {request.glider}")
+    _count(intake.note(report.store, file, GliderParams(), None, time.time()), report, on_file)
 
 
 def _check_glider(request: Request, jobs: Sequence[Job], calls: Iterable[Log], store: Store) -> None:
@@ -248,7 +302,7 @@ def _take(
 ) -> None:
     """Let the clock run until a file was `sent` (s), and take it."""
     glider = job.header.id.glider
-    params, ticked = request.params(glider), _tick(glider, report, told, sent)
+    params, ticked = request.params(glider), _tick(report, told, sent)
     try:
         if not isinstance(job.result, Segment):
             raise job.result if job.result is not None else Retry("was not decoded")
@@ -256,6 +310,8 @@ def _take(
         taken = intake.take(report.store, job.file, job.result, params, told, sent, ocean=ocean)
     except (Quarantine, Retry) as error:
         taken = intake.note(report.store, arrivals.failed(job.file, error), params, told, sent)
+    report.coming[glider].popleft()
+    report.clock[glider] = max(sent, report.clock.get(glider, sent))
     _count(replace(taken, alerts=(*ticked, *taken.alerts)), report, on_file)
 
 
@@ -267,27 +323,49 @@ def _take_log(
     on_file: Callable[[intake.Taken], None],
 ) -> None:
     """Let the clock run until a call was over, and take its log."""
-    ticked = _tick(log.file.glider, report, told, log.sent) if log.file.status is Status.TAKEN else []
-    params = request.params(log.file.glider)
-    taken = intake.take_log(report.store, log.file, log.dialog, params, told, log.sent)
+    glider, is_taken = log.file.glider, log.file.status is Status.TAKEN
+    ticked = _tick(report, told, log.sent) if is_taken else []
+    taken = intake.take_log(report.store, log.file, log.dialog, request.params(glider), told, log.sent)
+    if is_taken:
+        report.coming[glider].popleft()
+        report.clock[glider] = max(log.sent, report.clock.get(glider, log.sent))
     _count(replace(taken, alerts=(*ticked, *taken.alerts)), report, on_file)
 
 
-def _tick(glider: str, report: Report, told: Speaking, until: float) -> list[Alert]:
-    """What a daemon would have said of a glider's silence until a time (s).
+def _coming(jobs: Iterable[Job], calls: Iterable[Log]) -> dict[str, deque[float]]:
+    """When the files of each glider were opened and its calls were over, in order of time (s)."""
+    coming: dict[str, list[float]] = {}
+    for job in jobs:
+        coming.setdefault(job.header.id.glider, []).append(job.opened_at)
+    for log in calls:
+        if log.file.status is Status.TAKEN:
+            coming.setdefault(log.file.glider, []).append(log.sent)
+    return {glider: deque(sorted(times)) for glider, times in coming.items()}
 
-    Nothing between two deployments: a replay knows that the first one has ended.
+
+def _tick(report: Report, told: Speaking, until: float) -> list[Alert]:
+    """What a daemon would have said of the silence of all gliders until a time (s), in its order.
+
+    Nothing between two deployments, nor after the last file: a replay knows that a deployment has ended.
     """
     store, alerts = report.store, list[Alert]()
-    others = [other for other in store.gliders() if other != glider and not told.attention(other).recovered]
-    now = last = report.clock.get(glider, -math.inf)
-    at = intake.next_tick(store, glider, told, now) if until - now < GONE else None
-    while at is not None and last < at <= until:
-        alerts += intake.tick(store, glider, told, others, at)
-        last = at
-        at = intake.next_tick(store, glider, told, at)
-    report.clock[glider] = max(until, now)
-    return alerts
+    while True:
+        due = {g: t for g in report.clock if (t := _due(g, report, told, until)) is not None}
+        if not due:
+            return alerts
+        glider = min(due, key=lambda g: (due[g], g))
+        others = [g for g in store.gliders() if g != glider and not told.attention(g).recovered]
+        alerts += intake.tick(store, glider, told, others, due[glider])
+        report.clock[glider] = due[glider]
+
+
+def _due(glider: str, report: Report, told: Speaking, until: float) -> float | None:
+    """When there is something to say next of a glider's silence, if that is before `until` (s)."""
+    now, coming = report.clock[glider], report.coming[glider]
+    if not coming or coming[0] - now >= GONE:
+        return None
+    at = intake.next_tick(report.store, glider, told, now)
+    return at if at is not None and now < at <= until else None
 
 
 def _count(taken: intake.Taken, report: Report, on_file: Callable[[intake.Taken], None]) -> None:
@@ -297,5 +375,5 @@ def _count(taken: intake.Taken, report: Report, on_file: Callable[[intake.Taken]
 
 def _write(out: Path, store: Store) -> None:
     assessments = (assessment_line(a) for glider in store.gliders() for a in store.assessments(glider))
-    write_lines(out / "assessments.jsonl", assessments)
-    write_lines(out / "alerts.jsonl", (alert_line(a) for a in store.alerts()))
+    write_lines(out / ASSESSMENTS, assessments)
+    write_lines(out / ALERTS, (alert_line(a) for a in store.alerts()))

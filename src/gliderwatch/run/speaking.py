@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from gliderwatch.config import Config, Recipient
-from gliderwatch.model import Alert, Kind
+from gliderwatch.model import Alert, Kind, Severity
 from gliderwatch.rules.waiting import Wait
 from gliderwatch.run.intake import Speaking
 
@@ -26,11 +26,12 @@ def speaking(config: Config) -> Speaking:
 def channels(alert: Alert, config: Config) -> Waits:
     """The channels of all who are to get an alert, each with what they wait for.
 
-    A message of the operator's kind has no glider and goes by its severity alone. Only what belongs to an
-    incident can be acknowledged.
+    Only what belongs to an incident can be acknowledged.
     """
     if alert.kind == Kind.SURFACING:
         return waits((r for r in config.recipients.values() if alert.glider in r.surfacing), False)
+    if alert.kind == Kind.OPERATOR:
+        return waits(operators(config, alert.audience), bool(alert.incident))
     wanted = (
         r
         for r in config.recipients.values()
@@ -38,6 +39,12 @@ def channels(alert: Alert, config: Config) -> Waits:
         and alert.audience >= r.min_severity
     )
     return waits(wanted, bool(alert.incident))
+
+
+def operators(config: Config, audience: Severity) -> list[Recipient]:
+    """Who hears that the watch itself is in trouble; where there are none, all who want such messages."""
+    recipients = list(config.recipients.values())
+    return [r for r in recipients if r.operator] or [r for r in recipients if audience >= r.min_severity]
 
 
 def waits(recipients: Iterable[Recipient], can_be_acknowledged: bool) -> Waits:

@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from gliderwatch.config import Config
+from gliderwatch.config import Config, Link, linked_gliders
 from gliderwatch.model import Assessment, Expected, Incident
 from gliderwatch.params import Attention
 from gliderwatch.rules.acknowledged import Acks
+from gliderwatch.rules.constants import GONE, RECENT
+from gliderwatch.rules.irregularities import Irregularity
 from gliderwatch.rules.muting import with_mute
-from gliderwatch.rules.overdue import RECENT
-from gliderwatch.rules.silence import GONE, Awaited, awaited, guess, is_launched
+from gliderwatch.rules.silence import Awaited, awaited, guess, is_launched
 from gliderwatch.run.life import STALE, is_held, silence
 from gliderwatch.run.lines import assessment_line, iso
 from gliderwatch.run.manage.incidents import ack_json
@@ -28,7 +29,7 @@ class GliderStatus:
     """One glider: its last dive that ended, the open incidents, how many segments and dives are known.
 
     ``expected`` and ``awaited``: the next surfacing, as known ``at`` a time (s). ``acks``: who has taken
-    incidents on.
+    incidents on. ``irregularities`` of its files in the last 30 days.
     """
 
     name: str
@@ -42,6 +43,7 @@ class GliderStatus:
     expected: Expected | None = None
     awaited: Awaited | None = None
     acks: Acks = field(default_factory=dict)
+    irregularities: tuple[Irregularity, ...] = ()
 
     @property
     def is_over(self) -> bool:
@@ -74,6 +76,7 @@ class Overview:
     """All that `status` tells: whether the daemon is ``running``, since when it is silent (s; None: ever).
 
     ``held`` are messages that are to wait; ``undelivered`` those that should have been delivered.
+    ``links`` stand where the folders of gliders should be of which nothing is known.
     """
 
     running: bool
@@ -85,6 +88,7 @@ class Overview:
     unknown: tuple[File, ...]
     undelivered: tuple[Undelivered, ...]
     held: tuple[Undelivered, ...] = ()
+    links: dict[str, Link] = field(default_factory=dict)
 
     @property
     def alive(self) -> bool:
@@ -93,23 +97,27 @@ class Overview:
 
 
 def overview(config: Config) -> Overview:
-    """Look into the state file of a configuration. Raises StateError where there is none."""
+    """Look into the state file of a configuration. Raises StateError where there is none, or one that the
+    service has to migrate first."""
     path = Path(config.state.path)
     store, now = Store.reading(path), time.time()
     try:
-        waiting = store.undelivered()
-        names = sorted({*config.gliders, *store.gliders()})
-        return Overview(
-            running=is_held(path),
-            silent_for=silence(path),
-            gliders=tuple(_glider(store, name, config, now) for name in names),
-            files=store.counts(),
-            waiting=tuple(store.files(Status.WAITING)),
-            quarantined=tuple(store.files(Status.QUARANTINED)),
-            unknown=tuple(store.files(Status.UNKNOWN)),
-            undelivered=(*(u for u in waiting if u.held_until <= now), *store.refused(now - WEEK)),
-            held=tuple(u for u in waiting if u.held_until > now),
-        )
+        with store.guarded():
+            waiting = store.undelivered()
+            names = sorted({*config.gliders, *store.gliders()})
+            silent = set(config.gliders) - set(store.gliders())
+            return Overview(
+                running=is_held(path),
+                silent_for=silence(path),
+                gliders=tuple(_glider(store, name, config, now) for name in names),
+                files=store.counts(),
+                waiting=tuple(store.files(Status.WAITING)),
+                quarantined=tuple(store.files(Status.QUARANTINED)),
+                unknown=tuple(store.files(Status.UNKNOWN)),
+                undelivered=(*(u for u in waiting if u.held_until <= now), *store.refused(now - WEEK)),
+                held=tuple(u for u in waiting if u.held_until > now),
+                links=linked_gliders(config, silent) if silent else {},
+            )
     finally:
         store.close()
 
@@ -122,12 +130,14 @@ def _glider(store: Store, name: str, config: Config, now: float) -> GliderStatus
     attention = with_mute(config.attention(name), store.notes.muted_until(name))
     signs, acks = known.signs(now - RECENT), store.notes.acks(name)
     expected = known.expected(now)
-    if expected is None and is_launched(signs, known.has_dived(now - RECENT)):
-        expected = guess(signs, now)
+    recent_signs = [sign for sign in signs if sign.opened_at >= now - RECENT]
+    if expected is None and is_launched(recent_signs, known.has_dived(now - RECENT)):
+        expected = guess(recent_signs, now)
     call = awaited(expected, signs, now, attention.overdue_hours) if expected is not None else None
     configured = name in config.gliders
+    recent = tuple(i for i in known.irregularities(now) if now - i.t < GONE)
     return GliderStatus(
-        name, configured, segments, dives, latest, incidents, now, attention, expected, call, acks
+        name, configured, segments, dives, latest, incidents, now, attention, expected, call, acks, recent
     )
 
 
@@ -143,6 +153,7 @@ def as_json(view: Overview) -> dict[str, Any]:
                 "dives": g.dives,
                 "latest": assessment_line(g.latest) if g.latest is not None else None,
                 "incidents": [_incident(i, g.acks) for i in g.incidents],
+                "irregularities": [{"since": iso(i.t), "title": i.title} for i in g.irregularities],
                 **_silence(g),
             }
             for g in view.gliders
@@ -150,6 +161,7 @@ def as_json(view: Overview) -> dict[str, Any]:
         "files": {str(status): n for status, n in view.files.items()},
         "waiting": [{"path": f.path, "reason": f.reason, "cache": f.crc or None} for f in view.waiting],
         "quarantined": [{"path": f.path, "reason": f.reason} for f in view.quarantined],
+        "links": {name: {"path": str(k.path), "target": str(k.target)} for name, k in view.links.items()},
         "unknown_gliders": sorted({f.glider for f in view.unknown}),
         "undelivered": [
             {"alert": u.alert, "channel": u.channel, "attempts": u.attempts, "error": u.error}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 import time
 from collections.abc import Callable
 
@@ -15,6 +17,8 @@ log = structlog.get_logger(__name__)
 
 PAUSE = 2.0
 """Seconds between two tries."""
+ROOM = 1 << 20
+"""Bytes that have to be free before it is tried again: one small write can succeed where the next cannot."""
 _STEP = 0.2
 
 
@@ -39,7 +43,7 @@ class Trouble:
             with self._store.guarded():
                 if self._reason:
                     self._store.probe()
-                    self._end()
+                    self._reserve()
                 turn()
         except DamagedError:
             raise
@@ -47,7 +51,20 @@ class Trouble:
             self._tell(str(error))
             self._rest()
             return False
+        if self._reason:  # only now: what failed has been done, or there was nothing to do
+            self._end()
         return True
+
+    def _reserve(self) -> None:
+        """Take some room on the disk of the state for a moment. Raises StateError where there is none."""
+        folder = self._store.folder
+        if folder is None:
+            return
+        try:
+            with tempfile.TemporaryFile(dir=folder) as file:
+                os.posix_fallocate(file.fileno(), 0, ROOM)
+        except OSError:
+            raise StateError(self._reason) from None
 
     def _tell(self, reason: str) -> None:
         if not self._reason:

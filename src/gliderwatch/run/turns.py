@@ -19,7 +19,7 @@ class Turns:
         self._coming: dict[str, deque[float]] = {}
         self._ready: dict[str, deque[Job]] = {}
         for job in jobs:
-            self._coming.setdefault(job.header.id.glider, deque()).append(job.header.id.opened_at)
+            self._coming.setdefault(job.header.id.glider, deque()).append(job.opened_at)
             self._ready[job.header.id.glider] = deque()
 
     def after(self, job: Job) -> Iterator[tuple[Job, float]]:
@@ -36,7 +36,7 @@ class Turns:
         """When the first file that is ready was sent: at its end, else before the next was opened."""
         job, *later = self._ready[glider]
         if isinstance(job.result, Segment):
-            return job.result.last_t
-        opened = job.header.id.opened_at
-        coming = [*(j.header.id.opened_at for j in later), *self._coming[glider]]
+            return job.result.last_t + job.offset
+        opened = job.opened_at
+        coming = [*(j.opened_at for j in later), *self._coming[glider]]
         return min(next(iter(coming), opened), opened + LONGEST)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from gliderwatch.score.work import Task
 
 
-@click.command()
+@click.command(epilog="\b\nExample:\n  gliderwatch score --grid small --out score")
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
@@ -42,6 +42,7 @@ def score(out: Path, name: str, names: tuple[str, ...], missions: tuple[Path, ..
 
     from gliderwatch.score import estimators, grid, plots, pool, summary
     from gliderwatch.score.work import version
+    from gliderwatch.tables import show
 
     plots.pyplot()
     chosen = list(dict.fromkeys(estimators.check(e) for e in names)) or [estimators.ALGORITHMS[0]]
@@ -55,7 +56,8 @@ def score(out: Path, name: str, names: tuple[str, ...], missions: tuple[Path, ..
         result = summary.summarise(found, version())
         console = Console()
         for table in summary.tables(result):
-            console.print(table, "")
+            show(table, console)
+            console.print()
         summary.write(out / "score.json", result)
         plots.write_page(out / "score.html", result)
         console.print(f"written: {out}/score.json and score.html", soft_wrap=True, highlight=False)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -15,9 +17,11 @@ from gliderwatch.config.problem import nearest
 from gliderwatch.errors import ConfigError
 from gliderwatch.score.graft import Graft, GraftKind
 from gliderwatch.score.record import HEALTHY
+from gliderwatch.score.sensors import LEFT_OUT, cadence_without
 from gliderwatch.simulate.faults import SIZES, Fault, FaultKind
 from gliderwatch.simulate.scenario import Scenario
-from gliderwatch.simulate.scenarios import find, load
+from gliderwatch.simulate.scenarios import find, load, shipped
+from gliderwatch.simulate.seas import SEAS, sea_mission
 
 DAY = 86400.0
 Sizes = tuple[float, ...]
@@ -33,14 +37,23 @@ class Healthy:
 
 
 @dataclass(frozen=True, slots=True)
+class Sensors:
+    """Lists of sensors: gliders in ``seas``, and real missions, are run once more without each of
+    ``left_out`` (names of `score.sensors.LEFT_OUT`)."""
+
+    seas: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Grid:
     """A file of `config/score`.
 
     ``faults`` are the sizes of each fault (`simulate.faults.SIZES`), put into each of ``seas`` (scenarios
-    whose own faults are left out) with ``gliders`` gliders each; they fly ``days``, the fault begins on
-    day ``onset``. ``normal`` bounds the normal range of speed as parts of the median speed that the
-    glider itself believed while healthy: what a pilot sets from its first days. ``grafts`` are the
-    faults put onto real missions.
+    whose own faults are left out, or kinds of `simulate.seas.SEAS`) with ``gliders`` gliders each; they fly
+    ``days``, the fault begins on day ``onset``. ``normal`` bounds the normal range of speed as parts of the
+    median speed that the glider itself believed while healthy: what a pilot sets from its first days.
+    ``grafts`` are the faults put onto real missions; ``sensors`` says without which all is run once more.
     """
 
     seas: tuple[str, ...] = ()
@@ -51,6 +64,7 @@ class Grid:
     normal: tuple[float, float] = (0.7, 1.3)
     healthy: Healthy = Healthy()
     grafts: Mapping[GraftKind, Sizes] = field(default_factory=dict)
+    sensors: Sensors = Sensors()
 
     def __post_init__(self) -> None:
         if not 0 < self.normal[0] < self.normal[1]:
@@ -59,6 +73,9 @@ class Grid:
             raise ValueError("onset: a day of the mission, not before day 1")
         if self.gliders < 1 or self.healthy.gliders < 0 or self.healthy.days <= 0:
             raise ValueError("gliders: at least 1; healthy: 0 or more gliders for more than 0 days")
+        for name in self.sensors.left_out:
+            if name not in LEFT_OUT:
+                raise ValueError(f"sensors: nothing is called {name} ({nearest(name, LEFT_OUT)})")
         for kind, sizes in self.faults.items():
             for size in sizes:
                 Fault(kind, 0.0, size)
@@ -70,7 +87,7 @@ class Grid:
 @dataclass(frozen=True, slots=True)
 class Cell:
     """One glider to run: a simulated one by its ``scenario``, or a real one by its ``mission`` folder, with a
-    fault grafted onto it or none."""
+    fault grafted onto it or none, ``without`` some of its sensors (a name of `score.sensors.LEFT_OUT`)."""
 
     sea: str
     fault: str
@@ -80,12 +97,13 @@ class Cell:
     scenario: Scenario | None = None
     mission: Path | None = None
     graft: Graft | None = None
+    without: str = ""
 
     @property
     def name(self) -> str:
         """Short, for people and names of files."""
         what = HEALTHY if self.fault == HEALTHY else f"{self.fault}-{self.size:g}"
-        return f"{self.sea}-{what}-{self.seed}"
+        return f"{re.sub(r'[, ]+', '-', self.sea)}-{what}-{self.seed}"
 
 
 def folder() -> Path:
@@ -115,6 +133,11 @@ class _StrictHealthy(msgspec.Struct, forbid_unknown_fields=True):
     days: float = Healthy().days
 
 
+class _StrictSensors(msgspec.Struct, forbid_unknown_fields=True):
+    seas: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+
+
 class _Strict(msgspec.Struct, forbid_unknown_fields=True):
     """A file of a grid: what it holds, and nothing unknown."""
 
@@ -127,6 +150,7 @@ class _Strict(msgspec.Struct, forbid_unknown_fields=True):
     normal: tuple[float, float] = (0.7, 1.3)
     healthy: _StrictHealthy = msgspec.field(default_factory=_StrictHealthy)
     grafts: dict[GraftKind, Sizes] = {}
+    sensors: _StrictSensors = msgspec.field(default_factory=_StrictSensors)
 
     def grid(self) -> Grid:
         healthy = Healthy(self.healthy.seas, self.healthy.gliders, self.healthy.days)
@@ -139,47 +163,83 @@ class _Strict(msgspec.Struct, forbid_unknown_fields=True):
             self.normal,
             healthy,
             self.grafts,
+            Sensors(self.sensors.seas, self.sensors.left_out),
         )
 
 
 def cells(grid: Grid, missions: tuple[Path, ...] = ()) -> list[Cell]:
     """All that is to run, in the order of the grid; the long ones first, so that no core waits at the end."""
-    seas = {name: load(find(name)) for name in dict.fromkeys((*grid.healthy.seas, *grid.seas))}
+    names = dict.fromkeys((*grid.healthy.seas, *grid.seas, *grid.sensors.seas))
+    seas = {name: _sea(name) for name in names}
+    blind = [(sea, without) for sea in grid.sensors.seas for without in grid.sensors.left_out]
     found = [
-        _cell(seas[sea], sea, HEALTHY, 0.0, seed, grid.healthy.days, grid)
-        for sea in grid.healthy.seas
+        _cell(seas[sea], sea, without, HEALTHY, 0.0, seed, grid)
+        for sea, without in (*((sea, "") for sea in grid.healthy.seas), *blind)
         for seed in range(grid.healthy.gliders)
     ]
-    real = [mission.resolve() for mission in missions]
-    found += [Cell(_label(m), HEALTHY, 0.0, 0, grid.normal, mission=m) for m in real]
+    for mission in missions:
+        for without in ("", *grid.sensors.left_out):
+            found += _real(mission.resolve(), without, grid)
     found += [
-        Cell(_label(m), str(kind), size, 0, grid.normal, mission=m, graft=Graft(kind, size))
-        for m in real
-        for kind, sizes in grid.grafts.items()
-        for size in sizes
-    ]
-    found += [
-        _cell(seas[sea], sea, str(kind), size, seed, grid.days, grid)
+        _cell(seas[sea], sea, without, str(kind), size, seed, grid)
         for kind, sizes in grid.faults.items()
         for size in sizes
-        for sea in grid.seas
+        for sea, without in (*((sea, "") for sea in grid.seas), *blind)
         for seed in range(grid.gliders)
     ]
     return found
 
 
-def _label(mission: Path) -> str:
-    return mission.name if mission.name != "from-glider" else mission.parent.name
+def _real(mission: Path, without: str, grid: Grid) -> list[Cell]:
+    """A real mission without some sensors, as it is and with each graft."""
+    label = _label(mission.name if mission.name != "from-glider" else mission.parent.name, without)
+    return [
+        Cell(label, HEALTHY, 0.0, 0, grid.normal, mission=mission, without=without),
+        *(
+            Cell(label, str(kind), size, 0, grid.normal, None, mission, Graft(kind, size), without)
+            for kind, sizes in grid.grafts.items()
+            for size in sizes
+        ),
+    ]
 
 
-def _cell(base: Scenario, sea: str, fault: str, size: float, seed: int, days: float, grid: Grid) -> Cell:
-    """A glider that shares its chance with those of other sizes of the fault, and with no other."""
+def _label(name: str, without: str) -> str:
+    return f"{name}, no {without}" if without else name
+
+
+def _sea(name: str) -> Callable[[int], Scenario]:
+    """The mission in a sea by its chance: always one scenario, or one anew of a kind of sea. Raises
+    ConfigError where there is neither."""
+    if name in SEAS:
+        return partial(sea_mission, name)
+    if name not in shipped() and not Path(name).is_file():
+        near = nearest(name, (*shipped(), *SEAS))
+        raise ConfigError(
+            f"there is no scenario {name}, no such kind of sea, nor a file of that name ({near})"
+        )
+    scenario = load(find(name))
+    return lambda chance: scenario
+
+
+def _cell(
+    mission: Callable[[int], Scenario], sea: str, without: str, fault: str, size: float, seed: int, grid: Grid
+) -> Cell:
+    """A glider that shares its chance with those of other sizes of the fault and of fewer sensors, and with
+    no other."""
     chance = zlib.crc32(f"{sea}/{fault}/{seed}".encode())
+    base = mission(chance)
     faults: tuple[Fault, ...] = ()
     if fault != HEALTHY:
         kind = FaultKind(fault)
         faults = (Fault(kind, base.start + grid.onset * DAY, size, SIZES[kind].ramp),)
     scenario = replace(
-        base, seed=chance, glider="score", days=days, faults=faults, full_rate=False, science={}
+        base,
+        seed=chance,
+        glider="score",
+        days=grid.healthy.days if fault == HEALTHY else grid.days,
+        faults=faults,
+        full_rate=False,
+        science={},
+        cadence=cadence_without(base.cadence, LEFT_OUT[without] if without else ()),
     )
-    return Cell(sea, fault, size, seed, grid.normal, scenario)
+    return Cell(_label(sea, without), fault, size, seed, grid.normal, scenario, without=without)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from gliderwatch.score.record import HEALTHY, Record, Told
 
@@ -133,11 +134,17 @@ def _is_healthy(record: Record, t: float) -> bool:
 def bootstrap(gliders: Sequence[Record], number: Callable[[Sequence[Record]], float]) -> Interval:
     """A number of many gliders with the percentiles of the same of gliders drawn anew with replacement."""
     value = number(gliders)
-    rng = np.random.default_rng(0)
-    drawn = [
-        number([gliders[i] for i in rng.integers(len(gliders), size=len(gliders))]) for _ in range(RESAMPLES)
-    ]
-    low, high = np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    if len(gliders) == 1:  # every draw is the same one, which scipy refuses
+        return Interval(value, value, value)
+    low, high = stats.bootstrap(
+        (np.arange(len(gliders)),),
+        lambda drawn: number([gliders[i] for i in drawn]),
+        vectorized=False,
+        n_resamples=RESAMPLES,
+        confidence_level=LEVEL,
+        method="percentile",
+        rng=np.random.default_rng(0),
+    ).confidence_interval
     return Interval(value, float(low), float(high))
 
 
@@ -147,8 +154,7 @@ def quantile(values: Iterable[float], part: float) -> float:
     >>> quantile([1.0, 5.0, math.inf], 0.5), quantile([1.0, 5.0, math.inf], 0.9)
     (5.0, inf)
     """
-    ordered = sorted(values)
-    return ordered[max(math.ceil(part * len(ordered)) - 1, 0)]
+    return float(np.quantile(list(values), part, method="inverted_cdf"))
 
 
 def share(gliders: Sequence[Record], of: Callable[[Record], bool]) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import io
 import math
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,8 @@ def pyplot() -> Any:
         import matplotlib  # noqa: PLC0415 (only this page needs it)
     except ImportError:
         raise GliderwatchError(
-            "the page of plots needs a package that is not installed: pip install 'gliderwatch[score]'"
+            f"the page of plots needs matplotlib, which is not installed: {sys.executable} -m pip install "
+            "matplotlib"
         ) from None
     matplotlib.use("svg")
     matplotlib.rcParams.update(

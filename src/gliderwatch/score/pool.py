@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable, Iterable, Sequence
+import signal
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from pathlib import Path
 
 from gliderwatch.errors import GliderwatchError
@@ -36,7 +38,8 @@ def run_all(tasks: Sequence[Task], on_done: Callable[[], None]) -> list[str]:
     context = multiprocessing.get_context("spawn")  # to fork a process with threads is unsafe
     failed: dict[str, None] = {}  # of one mission all cells fail alike
     with ProcessPoolExecutor(min(cores, len(tasks)), mp_context=context) as pool:
-        futures = [pool.submit(work, task) for task in tasks]
+        with _deaf():  # to Ctrl-C, for good: it is this process that ends them, without a word of theirs
+            futures = [pool.submit(work, task) for task in tasks]
         try:
             for future in as_completed(futures):
                 try:
@@ -45,9 +48,21 @@ def run_all(tasks: Sequence[Task], on_done: Callable[[], None]) -> list[str]:
                     failed[str(error)] = None
                 on_done()
         except BaseException:
-            pool.shutdown(cancel_futures=True)
+            pool.shutdown(wait=False, cancel_futures=True)
+            for worker in multiprocessing.active_children():
+                worker.terminate()
             raise
     return list(failed)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Processes that begin inside do not hear Ctrl-C; this one hears it afterwards."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def results(cells: Iterable[Cell], estimators: Iterable[str], out: Path) -> list[Record]:

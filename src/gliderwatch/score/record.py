@@ -44,6 +44,7 @@ class NextResult:
 
     ``late`` (s) by how much it came later, ``miss`` (m) between the places; ``persistence`` (m) the same for
     the way of the dive before gone once more; whether place and time were within what was to hold 95 %.
+    ``hours`` lie between the two surfacings.
     """
 
     late: float
@@ -51,6 +52,7 @@ class NextResult:
     persistence: float
     in_ellipse: bool
     in_time: bool
+    hours: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

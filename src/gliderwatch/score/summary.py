@@ -22,6 +22,9 @@ from gliderwatch.score.record import Record
 from gliderwatch.score.speeds import SpeedScore, speed_scores
 from gliderwatch.score.surfacings import NextScore, next_scores
 
+_SEAS_IN_A_TABLE = 5
+"""Columns of seas that fit beside each other."""
+
 
 @dataclass(frozen=True, slots=True)
 class Summary:
@@ -58,13 +61,15 @@ def write(path: Path, summary: Summary) -> None:
 
 
 def tables(summary: Summary) -> Iterator[Table]:
-    """Tables of faults, of false messages, of speeds and of next surfacings; 80 columns."""
+    """Tables of faults, in all and by sea, of false messages, of speeds and of next surfacings."""
     overall = [s for s in summary.faults if s.sea == ""]
     for is_real in (False, True):
         for estimator in dict.fromkeys(s.estimator for s in overall if s.is_real == is_real):
             where = "real missions" if is_real else "simulated gliders"
             some = [s for s in overall if (s.estimator, s.is_real) == (estimator, is_real)]
             yield _faults(some, f"{estimator}: faults of {where}")
+            each = [s for s in summary.faults if (s.estimator, s.is_real) == (estimator, is_real) and s.sea]
+            yield from _by_sea(each, f"{estimator}: detected of {where}, and the median hours")
     for estimator in dict.fromkeys(s.estimator for s in summary.false):
         title = f"{estimator}: false messages a glider-month (95 %), false dives"
         yield _false([s for s in summary.false if s.estimator == estimator], title)
@@ -101,6 +106,26 @@ def _faults(scores: Iterable[FaultScore], title: str) -> Table:
             f"{100 * s.flag_2:.0f}%" + ("*" if s.expected == 2 else ""),
         )
     return table
+
+
+def _by_sea(scores: Sequence[FaultScore], title: str) -> Iterator[Table]:
+    """A column a sea, some of them in each table."""
+    seas = list(dict.fromkeys(s.sea for s in scores))
+    for first in range(0, len(seas), _SEAS_IN_A_TABLE):
+        some = seas[first : first + _SEAS_IN_A_TABLE]
+        table = _table(title, ("fault",), ("size", *some))
+        for fault, size in dict.fromkeys((s.fault, s.size) for s in scores):
+            cells = {s.sea: s for s in scores if (s.fault, s.size) == (fault, size)}
+            shown = (_detected(cells[sea]) if sea in cells else "" for sea in some)
+            table.add_row(fault, f"{size:g}", *shown)
+        yield table
+
+
+def _detected(score: FaultScore) -> str:
+    if score.detected is None:
+        return "-"
+    hours = f" {score.hours_median:.0f} h" if math.isfinite(score.hours_median) else ""
+    return f"{100 * score.detected.value:.0f}%{hours}"
 
 
 def _false(scores: Iterable[FalseScore], title: str) -> Table:

@@ -82,6 +82,7 @@ def _result(expected: Expected, before: _Fix, start: _Fix, end: _Fix) -> NextRes
         persistence=float(np.hypot(*(way - again))),
         in_ellipse=bool(miss @ np.linalg.solve(cov, miss) < INSIDE),
         in_time=abs(late) < 1.96 * expected.t_sigma,
+        hours=(end.t - start.t) / 3600,
     )
 
 

@@ -28,6 +28,7 @@ from gliderwatch.score.estimators import configuration
 from gliderwatch.score.graft import grafted, navigate, own_speeds
 from gliderwatch.score.grid import Cell
 from gliderwatch.score.record import HEALTHY, DiveResult, Record, Told
+from gliderwatch.score.sensors import LEFT_OUT, left_out
 from gliderwatch.score.surfacings import results as forecast_results
 from gliderwatch.simulate.delivery import FileForm, Names, arrivals
 from gliderwatch.simulate.dockserver import deliver, from_glider, write_cache
@@ -45,7 +46,7 @@ _NOT_SCORED = (
     "cli.py",
     "tables.py",
 )
-_OF_SCORE = ("score/graft.py", "score/record.py", "score/surfacings.py", "score/work.py")
+_OF_SCORE = ("score/graft.py", "score/record.py", "score/sensors.py", "score/surfacings.py", "score/work.py")
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +153,7 @@ def _replayed(
     request = Request((folder / "gliders",), (folder / "cache",), config)
     store = replay(request, on_file=on_file).store
     assessments = store.assessments(scenario.glider)
-    dives = _results(assessments, mission.truth)
+    dives = dive_results(assessments, mission.truth)
     upcoming = forecast_results(store.forecasts(scenario.glider), assessments, onset or math.inf)
     store.close()
     return Record(
@@ -190,7 +191,7 @@ def _openings(alerts: Iterable[Alert], on_shore: float) -> list[Told]:
     ]
 
 
-def _results(assessments: Iterable[Assessment], truth: Sequence[DiveTruth]) -> tuple[DiveResult, ...]:
+def dive_results(assessments: Iterable[Assessment], truth: Sequence[DiveTruth]) -> tuple[DiveResult, ...]:
     """The dives, each with the truth of the simulated one that it has most in common with."""
     return tuple(_result(a, _same(a, truth)) for a in assessments)
 
@@ -251,6 +252,8 @@ def _run_real(cell: Cell, mission: Path, estimators: Iterable[str]) -> list[Reco
     usual = median(before)
     if cell.graft is not None:
         segments = tuple(grafted(segments, cell.graft, onset, usual))
+    if cell.without:
+        segments = tuple(left_out(segments, LEFT_OUT[cell.without]))
     low, high = (part * usual for part in cell.normal)
     surfacings = tuple(dive.t_surface for dive in dives)
     out = []

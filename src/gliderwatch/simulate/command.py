@@ -9,7 +9,7 @@ import click
 from gliderwatch.errors import GliderwatchError
 
 
-@click.command()
+@click.command(epilog="\b\nExample:\n  gliderwatch simulate sea --gliders 2 --days 3 --fault remora:8@2")
 @click.argument("out", type=click.Path(file_okay=False, path_type=Path))
 @click.option("--scenario", "name", default="calm", help="A shipped scenario, or a YAML file (calm).")
 @click.option("--gliders", type=click.IntRange(1, 100), default=1, help="How many gliders fly (1).")

@@ -21,6 +21,7 @@ def dive(glider: Glider, segment: str) -> Flown:
     """Dive, and be at the surface again; ``segment`` names the file that logs it."""
     scenario, rng, start = glider.scenario, glider.rng, glider.cycle
     _face_the_stream(glider)
+    glider.trim_anew()
     motion = fly(glider)
     n = len(motion.depth)
     t = glider.times(start + np.arange(n))

@@ -133,7 +133,8 @@ def seen_drift(glider: Glider, fixes: Fixes) -> Vector:
     duration = CYCLE * float(fixes.cycles[-BURST:].mean() - fixes.cycles[:BURST].mean())
     if duration < 60:
         return glider.drift
-    first = Point(float(fixes.lat[:BURST].mean()), float(fixes.lon[:BURST].mean()))
-    last = Point(float(fixes.lat[-BURST:].mean()), float(fixes.lon[-BURST:].mean()))
+    lon = fixes.lon if np.ptp(fixes.lon) < 180 else fixes.lon % 360  # a mean over the antimeridian
+    first = Point(float(fixes.lat[:BURST].mean()), float(lon[:BURST].mean()))
+    last = Point(float(fixes.lat[-BURST:].mean()), float(lon[-BURST:].mean()))
     way = displacement(first, last)
     return Vector(way.east / duration, way.north / duration)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import gsw
 import numpy as np
 from numpy.typing import NDArray
 
 from gliderwatch.model import Array
 from gliderwatch.simulate.motion import Motion
 from gliderwatch.simulate.onboard import nmea, offset
-from gliderwatch.simulate.seawater import conductivity
 from gliderwatch.simulate.steering import Course
 from gliderwatch.simulate.telemetry import CYCLE, SCIENCE_CYCLE
 from gliderwatch.simulate.vehicle import NODE, Glider
@@ -27,6 +27,7 @@ _STRIKE = 0.7
 _RANGE = 90.0
 _AMPERES, _VOLTS, _CAPACITY = 0.25, 15.0, 550.0
 _INCHES = 0.9
+_S_M_PER_MS_CM = 0.1
 _SCIENCE_NOISE = (0.002, 0.0003, 0.002)
 _PER_CYCLE = round(CYCLE / SCIENCE_CYCLE)
 
@@ -179,6 +180,7 @@ def log_science(glider: Glider, motion: Motion, way: Way) -> None:
     noise = np.array(_SCIENCE_NOISE)[:, None] * glider.luck.standard_normal((3, n))
     cycles = _PER_CYCLE * glider.cycle + np.arange(n)
     log.add("sci_water_temp", cycles, temperature + noise[0])
-    log.add("sci_water_cond", cycles, conductivity(salinity, temperature, pressure) + noise[1])
+    conductivity = _S_M_PER_MS_CM * gsw.C_from_SP(salinity, temperature, pressure)
+    log.add("sci_water_cond", cycles, conductivity + noise[1])
     log.add("sci_water_pressure", cycles, np.maximum(0.1 * pressure + noise[2], 0.0))
     log.add("sci_ctd41cp_timestamp", cycles, log.clock(cycles) - 0.3)

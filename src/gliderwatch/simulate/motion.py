@@ -137,7 +137,7 @@ def _glide(glider: Glider, pitch: float, down: bool, t: float) -> tuple[Glide, f
     """The steady glide at a time, the volume pumped (m^3), and the power of the thruster (W)."""
     scenario, health = glider.scenario, glider.health
     pumped = scenario.drive * health.pumped(t)
-    drive = pumped if down else pumped * health.oil(t)
+    drive = (pumped if down else pumped * health.oil(t)) * (1 + scenario.drive_sigma * glider.trim)
     thruster = scenario.thruster if scenario.thruster and (scenario.thruster.on_dives or not down) else None
     thrust = thruster.thrust if thruster else 0.0
     glide = steady_glide(pitch, drive, scenario.airframe, drag=health.drag(t), thrust=thrust)

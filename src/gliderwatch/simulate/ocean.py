@@ -26,6 +26,7 @@ class Constituent(StrEnum):
     N2 = "N2"
     K1 = "K1"
     O1 = "O1"
+    M4 = "M4"
 
     @property
     def frequency(self) -> float:
@@ -39,6 +40,7 @@ _DEGREES_AN_HOUR = {
     Constituent.N2: 28.4397295,
     Constituent.K1: 15.0410686,
     Constituent.O1: 13.9430356,
+    Constituent.M4: 57.9682084,
 }
 
 
@@ -47,7 +49,9 @@ class Ellipse:
     """The ellipse of one tidal constituent.
 
     ``major`` and ``minor`` axis (m/s; a positive minor axis turns counter-clockwise),
-    ``inclination`` of the major axis (rad, counter-clockwise from east), ``phase`` (rad at t = 0).
+    ``inclination`` of the major axis (rad, counter-clockwise from east), ``phase`` (rad at t = 0), all at the
+    origin. From there the tide comes later by ``lag`` (rad/m; east, north), as a long wave does, and both
+    axes grow by ``growth`` (1/m; east, north), at most e times and at least to the e-th part.
     """
 
     constituent: Constituent
@@ -55,11 +59,15 @@ class Ellipse:
     minor: float = 0.0
     inclination: float = 0.0
     phase: float = 0.0
+    lag: tuple[float, float] = (0.0, 0.0)
+    growth: tuple[float, float] = (0.0, 0.0)
 
-    def current(self, t: Array) -> tuple[Array, Array]:
-        """Eastward and northward current (m/s) at times ``t`` (s)."""
-        angle = self.constituent.frequency * t - self.phase
-        along, across = self.major * np.cos(angle), self.minor * np.sin(angle)
+    def current(self, t: Array, east: Array | float = 0.0, north: Array | float = 0.0) -> tuple[Array, Array]:
+        """Eastward and northward current (m/s) at times ``t`` (s) and places (m from the origin)."""
+        late = self.lag[0] * east + self.lag[1] * north
+        size = np.exp(np.tanh(self.growth[0] * east + self.growth[1] * north))
+        angle = self.constituent.frequency * t - self.phase - late
+        along, across = size * self.major * np.cos(angle), size * self.minor * np.sin(angle)
         c, s = np.cos(self.inclination), np.sin(self.inclination)
         return along * c - across * s, along * s + across * c
 
@@ -171,7 +179,7 @@ class Ocean:
             left = 1 - self.sea.shear * (1 - np.exp(-np.asarray(depth) / self.sea.shear_depth))
             u, v = u * left, v * left
         for ellipse in self.sea.tides:
-            tide_u, tide_v = ellipse.current(t)
+            tide_u, tide_v = ellipse.current(t, east, north)
             u, v = u + tide_u, v + tide_v
         if self.sea.inertial:
             turning = self._inertial(t, depth)

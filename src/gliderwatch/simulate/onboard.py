@@ -38,13 +38,22 @@ def _radii(lat: Array) -> tuple[Array, Array]:
     return _A * (1 - _E2) / w**1.5, _A / np.sqrt(w)
 
 
+def wrapped(degrees: Array) -> Array:
+    """A longitude or a difference of two, brought to -180 to 180 degrees.
+
+    >>> wrapped(np.array([180.25, -180.25, -84.0])).tolist()
+    [-179.75, 179.75, -84.0]
+    """
+    return np.asarray(np.where(np.abs(degrees) > 180.0, (degrees + 180.0) % 360.0 - 180.0, degrees))
+
+
 def offset(origin: Point, east: Array, north: Array) -> tuple[Array, Array]:
     """Latitude and longitude (degrees) some tens of kilometres or less from ``origin`` (m)."""
     meridian, _ = _radii(np.asarray(origin.lat))
     lat = origin.lat + np.degrees(north / meridian)
     middle = (lat + origin.lat) / 2
     _, across = _radii(middle)
-    return lat, origin.lon + np.degrees(east / (across * np.cos(np.radians(middle))))
+    return lat, wrapped(origin.lon + np.degrees(east / (across * np.cos(np.radians(middle)))))
 
 
 def displacement(origin: Point, to: Point) -> Vector:
@@ -52,7 +61,7 @@ def displacement(origin: Point, to: Point) -> Vector:
     meridian, _ = _radii(np.asarray(origin.lat))
     middle = (to.lat + origin.lat) / 2
     _, across = _radii(np.asarray(middle))
-    east = np.radians(to.lon - origin.lon) * across * np.cos(np.radians(middle))
+    east = np.radians(wrapped(np.asarray(to.lon - origin.lon))) * across * np.cos(np.radians(middle))
     return Vector(float(east), float(np.radians(to.lat - origin.lat) * meridian))
 
 

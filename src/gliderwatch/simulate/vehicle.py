@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import exp, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from gliderwatch.simulate.telemetry import CYCLE, Log
 
 NODE = 15
 """Cycles between the times at which the current is looked up and the rudder is moved."""
+_TRIM_MEMORY = 86400.0
 
 
 @dataclass(slots=True)
@@ -27,7 +29,8 @@ class Glider:
     had at ``fix_cycle``; ``drift`` (m/s, true north) the drift at the surface as seen by fixes; ``water``
     (m/s, magnetic north) the current it reckons with; ``waypoint`` the index of its goal; ``lmc`` the
     origin of its local mission coordinates. ``against`` (unit vector) is the way of the current that
-    sets against it; ``inflections`` counts, ``charge`` (A h) is used up. ``rng`` moves the glider,
+    sets against it; ``inflections`` counts, ``charge`` (A h) is used up; ``trim`` is what the water adds to
+    its drive, in units of `Scenario.drive_sigma`. ``rng`` moves the glider,
     ``luck`` all that came to be simulated later, so that neither disturbs the other.
     """
 
@@ -50,10 +53,18 @@ class Glider:
     against: Vector = Vector(0.0, 0.0)
     inflections: int = 0
     charge: float = 0.0
+    trim: float = 0.0
     health: Health = field(init=False)
+    trimming: np.random.Generator = field(init=False)
 
     def __post_init__(self) -> None:
-        self.health = self.scenario.health
+        self.health, self.trimming = self.scenario.health, self.scenario.rng(4)
+        self.trim = float(self.trimming.standard_normal())
+
+    def trim_anew(self) -> None:
+        """Let ``trim`` wander by the time of a dive."""
+        kept = exp(-self.scenario.interval / _TRIM_MEMORY)
+        self.trim = kept * self.trim + sqrt(1 - kept**2) * float(self.trimming.standard_normal())
 
     def time(self, cycle: int) -> float:
         """Time (s) of a cycle."""

@@ -7,12 +7,16 @@ of the state".
 
 from __future__ import annotations
 
+import base64
 import math
 from collections.abc import Callable, Mapping
 from functools import reduce
 from typing import Any
 
-from gliderwatch.model import Segment
+import numpy as np
+
+from gliderwatch.estimation.joint import JointParams, init
+from gliderwatch.model import Array, Segment
 from gliderwatch.pipeline import GliderState
 
 Converter = Callable[[Any], Any]
@@ -68,7 +72,42 @@ def typed_dives(state: Any) -> Any:
     return state
 
 
-CONVERTERS: Mapping[type, tuple[Converter, ...]] = {GliderState: (typed_dives,), Segment: ()}
+def one_sea(state: Any) -> Any:
+    """Layout 2 to 3: the joint estimate has one model of the sea, with its time at the end of the last dive.
+
+    The speed W, slip and side (the last three numbers of its state) stay, with their covariances, and all
+    that is known of normal; the flow is to be learnt again, which takes a day, and so are hypotheses of a
+    step.
+    """
+    for memory in (state["settled"], state["memory"]):
+        speed = memory["estimate"]["joint"]["speed"]
+        old = speed["joint"]
+        if old is not None:
+            new = init(JointParams(), old["t"] if old["end"] is None else old["end"]["t"])
+            x, cov = np.array(new.x), np.array(new.cov)
+            x[-3:], cov[-3:, -3:] = _array(old["x"])[-3:], _array(old["cov"])[-3:, -3:]
+            kept = {name: old[name] for name in ("doubt", "dives", "nis", "dof", "end")}
+            speed["joint"] = {**kept, "t": new.t, "x": _written(x), "cov": _written(cov)}
+    return state
+
+
+def _array(written: Mapping[str, Any]) -> Array:
+    """An array as a record holds it."""
+    return np.frombuffer(base64.b64decode(written["f64"]), dtype="<f8").reshape(written["shape"])
+
+
+def _written(array: Array) -> dict[str, Any]:
+    """The same the other way."""
+    data = np.ascontiguousarray(array, dtype="<f8")
+    return {"shape": list(array.shape), "f64": base64.b64encode(data.tobytes()).decode()}
+
+
+def same(segment: Any) -> Any:
+    """Layout 1 to 2 of a segment: its notes are empty."""
+    return segment
+
+
+CONVERTERS: Mapping[type, tuple[Converter, ...]] = {GliderState: (typed_dives, one_sea), Segment: (same,)}
 """For each kind of record the way from layout 1 to today's: the n-th leads from layout n to n + 1. What is in
 it stays in it, for records of every layout are in use somewhere."""
 

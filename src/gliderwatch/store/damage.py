@@ -17,7 +17,7 @@ from gliderwatch.errors import GliderwatchError, StateError
 from gliderwatch.model import Alert
 from gliderwatch.rules.announce import Said
 from gliderwatch.store import codec
-from gliderwatch.store.database import DAMAGE, DELIVERY_BY_WORDS, connect, guarded, primary
+from gliderwatch.store.database import DAMAGE, DELIVERY_BY_WORDS, connect, guarded, primary, refuse_foreign
 from gliderwatch.store.outbox import post
 
 LOOK = 1.0
@@ -59,10 +59,12 @@ def _interrupt(db: sqlite3.Connection, late: threading.Event) -> None:
 
 
 def set_aside(path: Path, now: float) -> Path:
-    """Give a state file another name, with its log; which. Raises StateError where that cannot be done.
+    """Give a state file another name, with its log; which. Raises StateError where that cannot be done, or
+    where the file is not gliderwatch's.
 
     The file itself comes last: after a power cut half-way it is found damaged again.
     """
+    refuse_foreign(path)
     name = path.name + _MARK + time.strftime("%Y%m%dT%H%M%SZ", time.gmtime(now))
     aside = path.with_name(name)
     while aside.exists():

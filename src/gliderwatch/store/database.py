@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -12,10 +14,20 @@ import msgspec
 
 from gliderwatch.errors import DamagedError, StateError
 from gliderwatch.store import conversion
+from gliderwatch.store.ownership import APPLICATION_ID, foreign
 
-__all__ = ["MEMORY", "SCHEMA", "StateError", "connect", "guarded", "read_only", "schema"]
+__all__ = [
+    "MEMORY",
+    "SCHEMA",
+    "StateError",
+    "connect",
+    "guarded",
+    "read_only",
+    "refuse_foreign",
+    "schema",
+]
 
-SCHEMA = 6
+SCHEMA = 7
 DELIVERY_BY_WORDS = """CASE
     WHEN delivered_at IS NULL THEN 'pending' WHEN error = '' THEN 'delivered'
     WHEN error LIKE 'withdrawn: %' THEN 'withdrawn' WHEN error LIKE 'given up: %' THEN 'unreadable'
@@ -75,6 +87,57 @@ UPDATE files SET hindrance = CASE WHEN status = 'duplicate' AND reason = 'was re
 CREATE INDEX files_by_segment ON files (glider, segment);
 """,
     6: """
+CREATE TABLE segments_6 (
+    glider       TEXT NOT NULL,
+    opened_at    REAL NOT NULL,        -- as corrected: the glider's clock and clock_offset
+    name         TEXT NOT NULL,        -- not unique: a mission counter may begin again
+    completeness TEXT NOT NULL,
+    milestone    INTEGER NOT NULL,     -- 1 where the checkpoint is kept for good
+    last_t       REAL NOT NULL,        -- its last sample, by the glider's clock
+    clock_offset REAL NOT NULL DEFAULT 0,  -- added to the glider's clock (s)
+    clock_step   REAL NOT NULL DEFAULT 0,  -- by how much that was set back before it (s; 0: not)
+    segment      BLOB NOT NULL,        -- its times are those of the glider's clock
+    checkpoint   BLOB,                 -- NULL where thinned out: the next older one is gone on from
+    PRIMARY KEY (glider, opened_at, name)
+) STRICT;
+INSERT INTO segments_6 (glider, opened_at, name, completeness, segment, checkpoint, milestone, last_t)
+    SELECT s.glider, s.opened_at, s.name, s.completeness, s.segment, s.checkpoint, s.milestone,
+        coalesce(h.last_t, s.opened_at)
+    FROM segments s LEFT JOIN heard h ON h.glider = s.glider AND h.segment = s.name;
+DROP TABLE segments;
+ALTER TABLE segments_6 RENAME TO segments;
+CREATE INDEX segments_by_name ON segments (glider, name);
+CREATE INDEX segments_to_resume_from ON segments (glider, opened_at, name) WHERE checkpoint IS NOT NULL;
+CREATE INDEX segments_with_step ON segments (glider) WHERE clock_step != 0;
+CREATE TABLE heard_6 (
+    glider       TEXT NOT NULL,
+    segment      TEXT NOT NULL,
+    opened_at    REAL NOT NULL,        -- as corrected
+    last_t       REAL,                 -- as corrected; NULL where it is not read
+    at           REAL NOT NULL,
+    clock_offset REAL NOT NULL DEFAULT 0,
+    PRIMARY KEY (glider, opened_at, segment)
+) STRICT;
+INSERT INTO heard_6 (glider, segment, opened_at, last_t, at)
+    SELECT glider, segment, opened_at, last_t, at FROM heard;
+DROP TABLE heard;
+ALTER TABLE heard_6 RENAME TO heard;
+CREATE INDEX heard_by_segment ON heard (glider, segment);
+CREATE INDEX heard_by_arrival ON heard (glider, at);
+CREATE TABLE expected_6 (
+    glider    TEXT NOT NULL,
+    segment   TEXT NOT NULL,
+    opened_at REAL NOT NULL,
+    after     REAL NOT NULL,
+    data      TEXT NOT NULL,
+    PRIMARY KEY (glider, opened_at, segment)
+) STRICT;
+INSERT INTO expected_6 SELECT glider, segment, opened_at, after, data FROM expected;
+DROP TABLE expected;
+ALTER TABLE expected_6 RENAME TO expected;
+CREATE INDEX expected_in_order ON expected (glider, after, opened_at);
+""",
+    7: """
 CREATE TABLE calls (              -- what the log of each call has told
     path   TEXT PRIMARY KEY,
     glider TEXT NOT NULL,         -- as the log says; empty while it has not
@@ -97,6 +160,7 @@ DAMAGE = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
 _ROOM = "make room on its disk: it goes on by itself, nothing is lost"
 _WRITE = "let the user of the service write there, on a disk that is not mounted read-only"
 _CURES = {
+    sqlite3.SQLITE_ERROR: "systemctl restart gliderwatch, which takes on a file of an earlier release",
     sqlite3.SQLITE_FULL: _ROOM,
     sqlite3.SQLITE_IOERR: f"see what the kernel says of its disk (dmesg); where that is full, {_ROOM}",
     sqlite3.SQLITE_READONLY: _WRITE,
@@ -143,12 +207,16 @@ def connect(path: Path | str, *, durable: bool = True) -> sqlite3.Connection:
     again. Raises StateError.
     """
     if path != MEMORY:
+        refuse_foreign(Path(path))
         _make_folder(Path(path))
     with guarded(path):
         connection = sqlite3.connect(path, timeout=30.0, isolation_level=None, check_same_thread=False)
         try:
-            if connection.execute("PRAGMA page_count").fetchone()[0] == 0:  # of no effect after the next line
+            if (
+                connection.execute("PRAGMA page_count").fetchone()[0] == 0
+            ):  # of no effect after the next lines
                 connection.execute("PRAGMA auto_vacuum = INCREMENTAL")
+                connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")  # before all else in the file
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute(f"PRAGMA synchronous = {'FULL' if durable else 'OFF'}")
             connection.execute("PRAGMA foreign_keys = ON")
@@ -164,6 +232,7 @@ def read_only(path: Path) -> sqlite3.Connection:
     """A connection that only reads, for `status`. Raises StateError where there is no state file."""
     if not path.exists():
         raise StateError(f"there is no state file {path}: has the daemon run with this configuration?")
+    refuse_foreign(path)
     with guarded(path):
         connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=30.0)
         try:
@@ -173,6 +242,18 @@ def read_only(path: Path) -> sqlite3.Connection:
             connection.close()
             raise
     return connection
+
+
+def refuse_foreign(path: Path, cure: str = "Name another file in state.path, or move this one away") -> None:
+    """Raises StateError where there is a file at `path` that is not gliderwatch's. Nothing is written."""
+    why = foreign(path, _table_names())
+    if why is not None:
+        raise StateError(f"state file {path} is not gliderwatch's: {why}. It is left alone. {cure}")
+
+
+@cache
+def _table_names() -> frozenset[str]:
+    return frozenset(re.findall(r"CREATE TABLE (\w+)", "\n".join([schema(), *MIGRATIONS.values()])))
 
 
 def _make_folder(path: Path) -> None:
@@ -197,6 +278,10 @@ def _migrate(connection: sqlite3.Connection, path: Path | str) -> None:
     version = connection.execute("PRAGMA user_version").fetchone()[0]
     _check_version(version, path)
     if version == SCHEMA:
+        if (
+            connection.execute("PRAGMA application_id").fetchone()[0] != APPLICATION_ID
+        ):  # of an earlier release
+            connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
         return
     steps = [] if version else [schema()]
     steps += [MIGRATIONS[v] for v in range(max(version, 1) + 1, SCHEMA + 1)]
@@ -204,7 +289,9 @@ def _migrate(connection: sqlite3.Connection, path: Path | str) -> None:
         connection.create_function(name, 1, _on_text(convert), deterministic=True)
     with closing(connection.cursor()) as cursor:
         cursor.executescript(
-            "BEGIN IMMEDIATE;\n" + "\n".join(steps) + f"\nPRAGMA user_version = {SCHEMA};\nCOMMIT;"
+            "BEGIN IMMEDIATE;\n"
+            + "\n".join(steps)
+            + f"\nPRAGMA application_id = {APPLICATION_ID};\nPRAGMA user_version = {SCHEMA};\nCOMMIT;"
         )
 
 

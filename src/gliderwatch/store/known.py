@@ -6,8 +6,11 @@ import sqlite3
 from collections.abc import Iterator
 
 from gliderwatch.alerts.unknown import Unjudged
-from gliderwatch.model import Assessment, Call, Expected, Hindrance, Incident, Unusable
+from gliderwatch.model import Assessment, Call, Expected, Fix, Hindrance, Incident, Unusable
+from gliderwatch.rules.constants import GONE
+from gliderwatch.rules.irregularities import PLACES, Coming, Irregularity, found
 from gliderwatch.rules.silence import Sign
+from gliderwatch.store import clocks
 from gliderwatch.store.rows import values
 
 
@@ -98,10 +101,33 @@ class Known:
         for row in self._db.execute(sql, (self.glider, since)):
             yield Unjudged(row[0], row[1], Unusable.DATA_MISSING, "its file holds no data")
 
-    def signs(self, since: float) -> tuple[Sign, ...]:
-        """Its files that were opened at `since` (s) or later, and its calls since then."""
+    def irregularities(self, now: float) -> list[Irregularity]:
+        """What is wrong with its files, as known at `now` (s)."""
+        steps = clocks.steps(self._db, self.glider)
+        return found(self.glider, steps, self.places(PLACES), self.comings(now - GONE, now))
+
+    def places(self, n: int) -> list[Fix]:
+        """Where and when it surfaced the last `n` times that are known, in order of time."""
         sql = (
-            "SELECT opened_at, last_t, at, 0 FROM heard WHERE glider = ?1 AND opened_at >= ?2 "
+            "SELECT t_surface, json_extract(data, '$.lat'), json_extract(data, '$.lon') FROM assessments "
+            "WHERE glider = ? AND ended = 1 ORDER BY t_surface DESC LIMIT ?"
+        )
+        rows = self._db.execute(sql, (self.glider, n)).fetchall()
+        return [Fix(*row) for row in reversed(rows) if row[1] is not None and row[2] is not None]
+
+    def comings(self, since: float, until: float) -> list[Coming]:
+        """Its segments of which the first file came between two times (s), in that order."""
+        sql = (
+            "SELECT segment, coalesce(last_t, opened_at), at, "
+            "(SELECT min(at) FROM heard WHERE glider = ?1) "
+            "FROM heard WHERE glider = ?1 AND at BETWEEN ?2 AND ?3 ORDER BY at"
+        )
+        return [Coming(*row) for row in self._db.execute(sql, (self.glider, since, until))]
+
+    def signs(self, since: float) -> tuple[Sign, ...]:
+        """Its files that were opened at `since` (s) or later, or that came since, and its calls."""
+        sql = (
+            "SELECT opened_at, last_t, at, 0 FROM heard WHERE glider = ?1 AND (opened_at >= ?2 OR at >= ?2) "
             "UNION ALL SELECT began, last_t, at, 1 FROM calls WHERE glider = ?1 AND last_t >= ?2"
         )
         rows = self._db.execute(sql, (self.glider, since))

@@ -8,7 +8,8 @@ from pathlib import Path
 from gliderwatch.model import SegmentId
 from gliderwatch.pipeline import GliderState
 from gliderwatch.rules.announce import Said
-from gliderwatch.store import codec, retention
+from gliderwatch.store import codec
+from gliderwatch.store.clocks import FIRST
 
 _TABLES = ("segments", "assessments", "incidents", "expected")
 
@@ -32,7 +33,7 @@ def seed(old: sqlite3.Connection, new: sqlite3.Connection, glider: str) -> None:
     row = old.execute(
         "SELECT * FROM segments WHERE glider = ? ORDER BY opened_at, name LIMIT 1", (glider,)
     ).fetchone()
-    if row is None or row["milestone"] != retention.FIRST:
+    if row is None or row["milestone"] != FIRST:
         return
     _put(new, "segments", [row])
     if row["checkpoint"] is None:
@@ -42,8 +43,8 @@ def seed(old: sqlite3.Connection, new: sqlite3.Connection, glider: str) -> None:
     for table, time in (("assessments", "t_dive"), ("incidents", "opened_at")):
         sql = f"SELECT * FROM {table} WHERE glider = ? AND {time} <= ?"
         _put(new, table, old.execute(sql, (glider, until)).fetchall())
-    sql = "SELECT * FROM expected WHERE glider = ? AND segment = ?"
-    _put(new, "expected", old.execute(sql, (glider, row["name"])).fetchall())
+    sql = "SELECT * FROM expected WHERE glider = ? AND opened_at = ? AND segment = ?"
+    _put(new, "expected", old.execute(sql, (glider, row["opened_at"], row["name"])).fetchall())
 
 
 def _put(db: sqlite3.Connection, table: str, rows: list[sqlite3.Row]) -> None:

@@ -15,13 +15,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from gliderwatch.model import Incident, SegmentId
+from gliderwatch.navigation.clock import is_same
 from gliderwatch.pipeline import GliderState
 from gliderwatch.rules.announce import Said
 from gliderwatch.rules.retained import ended_at, is_removable, kept_since
 from gliderwatch.store import codec
+from gliderwatch.store.clocks import FIRST
 
-FIRST = 2
-"""`milestone` of a segment before which nothing is kept any more."""
 AT_ONCE = 500
 """Rows removed in one transaction."""
 _PAGES = 1000
@@ -41,7 +41,8 @@ def is_past(db: sqlite3.Connection, identity: SegmentId) -> bool:
     ).fetchone()
     if row is None or row[2] != FIRST:
         return False
-    return identity.name == row[1] or (identity.opened_at, identity.name) <= (row[0], row[1])
+    first = SegmentId(row[0], identity.glider, row[1])
+    return is_same(identity, first) or (identity.opened_at, identity.name) <= (row[0], row[1])
 
 
 def remove(

@@ -7,10 +7,12 @@ import zlib
 from dataclasses import replace
 
 from gliderwatch.model import Segment, SegmentId
+from gliderwatch.navigation.clock import SAME_OPENING, Correction, moved, numbered
 from gliderwatch.navigation.samples import compact
 from gliderwatch.pipeline import GliderState
-from gliderwatch.store import codec, retention
+from gliderwatch.store import clocks, codec
 from gliderwatch.store.ahead import Ahead
+from gliderwatch.store.clocks import FIRST
 
 RECENT = 64
 """Newest segments of a glider that all keep their checkpoint."""
@@ -29,34 +31,62 @@ class Segments:
         self._db = connection
         self.ahead, self.following = Ahead(), 0
 
-    def completeness(self, glider: str, name: str) -> tuple[int, int, str] | None:
-        """Of the copy of a segment that is held, None when there is none."""
-        row = self._db.execute(
-            "SELECT completeness FROM segments WHERE glider = ? AND name = ?", (glider, name)
+    def completeness(self, identity: SegmentId) -> tuple[int, int, str] | None:
+        """Of the copy of a segment that is held, None when there is none; by the glider's clock."""
+        row = self._held(identity)
+        return codec.plain_decode(row["completeness"], tuple[int, int, str]) if row is not None else None
+
+    def is_held(self, glider: str, name: str) -> bool:
+        """Whether any segment of this name is held."""
+        sql = "SELECT EXISTS (SELECT 1 FROM segments WHERE glider = ? AND name = ?)"
+        return bool(self._db.execute(sql, (glider, name)).fetchone()[0])
+
+    def _held(self, identity: SegmentId) -> sqlite3.Row | None:
+        """The row of a segment by the glider's clock: the files of one segment open within seconds."""
+        row: sqlite3.Row | None = self._db.execute(
+            "SELECT opened_at, completeness, clock_offset, clock_step FROM segments "
+            "WHERE glider = ?1 AND name = ?2 AND abs(opened_at - clock_offset - ?3) <= ?4 "
+            "ORDER BY abs(opened_at - clock_offset - ?3) LIMIT 1",
+            (identity.glider, identity.name, identity.opened_at, SAME_OPENING),
         ).fetchone()
-        return codec.plain_decode(row[0], tuple[int, int, str]) if row is not None else None
+        return row
 
     def put(self, segment: Segment) -> SegmentId:
         """Keep a segment in place of an earlier copy; the first id in time that this touches.
 
+        Its times are by the glider's clock. Where that was set back the segment, and others of its mission
+        of which that is only now seen, get the ids that they have in the right time.
         What navigation would average anyway is kept as that: 4 s data would fill the state file.
         """
         thinned = replace(segment, quantities=compact(segment.quantities))
-        key = (segment.id.glider, segment.id.name)
-        old = self._db.execute("SELECT opened_at FROM segments WHERE glider = ? AND name = ?", key).fetchone()
+        glider, name = segment.id.glider, segment.id.name
+        old, touched, correction = self._held(segment.id), list[SegmentId](), Correction()
+        if old is not None:
+            touched = [SegmentId(old["opened_at"], glider, name)]
+            correction = Correction(old["clock_offset"], old["clock_step"])
+            self._forget(touched[0])
         self._db.execute(
-            "INSERT OR REPLACE INTO segments VALUES (?, ?, ?, ?, ?, NULL, ?)",
+            "INSERT INTO segments VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, NULL)",
             (
-                segment.id.glider,
-                segment.id.opened_at,
-                segment.id.name,
+                glider,
+                segment.id.opened_at + correction.offset,
+                name,
                 codec.plain_encode(segment.completeness),
+                _is_milestone(name),
+                segment.last_t,
+                correction.offset,
+                correction.step,
                 codec.encode(thinned),
-                _is_milestone(segment.id.name),
             ),
         )
-        before = [] if old is None else [SegmentId(old[0], *key)]
-        return min([segment.id, *before])
+        moves = clocks.correct(self._db, glider, numbered(name)[0])
+        here = SegmentId(segment.id.opened_at + correction.offset, glider, name)
+        return min([moves.pop(here, here), *touched, *moves, *moves.values()])
+
+    def _forget(self, identity: SegmentId) -> None:
+        key = (identity.glider, identity.opened_at, identity.name)
+        self._db.execute("DELETE FROM segments WHERE glider = ? AND opened_at = ? AND name = ?", key)
+        self._db.execute("DELETE FROM expected WHERE glider = ? AND opened_at = ? AND segment = ?", key)
 
     def resume(self, first: SegmentId) -> tuple[GliderState, list[SegmentId]]:
         """The newest state before a segment, and the ids of all segments after it, in order of time."""
@@ -82,42 +112,52 @@ class Segments:
         return [SegmentId(row[0], glider, row[1]) for row in rows]
 
     def get(self, identity: SegmentId) -> Segment:
-        """A segment that is held."""
-        row = self._db.execute(
-            "SELECT segment FROM segments WHERE glider = ? AND name = ?", (identity.glider, identity.name)
+        """A segment that is held, in its right time."""
+        row = self._row(identity)
+        return moved(codec.decode(row["segment"], Segment), row["clock_offset"])
+
+    def as_sent(self, identity: SegmentId) -> Segment:
+        """The same in the time of the glider's clock."""
+        return codec.decode(self._row(identity)["segment"], Segment)
+
+    def _row(self, identity: SegmentId) -> sqlite3.Row:
+        row: sqlite3.Row = self._db.execute(
+            "SELECT segment, clock_offset FROM segments WHERE glider = ? AND opened_at = ? AND name = ?",
+            (identity.glider, identity.opened_at, identity.name),
         ).fetchone()
-        return codec.decode(row[0], Segment)
+        return row
 
     def checkpoint(self, identity: SegmentId, state: GliderState) -> None:
         """Keep the state after a segment, and the surfacing that it leads to expect."""
-        key = (identity.glider, identity.name)
+        key = (identity.glider, identity.opened_at, identity.name)
         if self.following:
             self.ahead.keep(identity, state)
         else:
             self.ahead.drop(identity.glider)
         is_kept = self.following < RECENT or _is_milestone(identity.name)
         self._db.execute(
-            "UPDATE segments SET checkpoint = ?1 WHERE glider = ?2 AND name = ?3 "
+            "UPDATE segments SET checkpoint = ?1 WHERE glider = ?2 AND opened_at = ?3 AND name = ?4 "
             "AND (?1 IS NOT NULL OR checkpoint IS NOT NULL)",
             (codec.encode(state) if is_kept else None, *key),
         )
-        self._db.execute("DELETE FROM expected WHERE glider = ? AND segment = ?", key)
+        self._db.execute("DELETE FROM expected WHERE glider = ? AND opened_at = ? AND segment = ?", key)
         if (e := state.memory.expected) is not None:
-            row = (*key, identity.opened_at, e.after, codec.plain_encode(e))
+            row = (identity.glider, identity.name, identity.opened_at, e.after, codec.plain_encode(e))
             self._db.execute("INSERT INTO expected VALUES (?, ?, ?, ?, ?)", row)
 
     def thin(self, glider: str) -> None:
         """Let go of the checkpoints that are not among the `RECENT` newest, but for one in `SPARSE`."""
         rows = self._db.execute(  # of the index alone: `milestone` lies behind the long records of its row
-            "SELECT name FROM segments WHERE glider = ?1 AND checkpoint IS NOT NULL AND (opened_at, name) < "
+            "SELECT opened_at, name FROM segments WHERE glider = ?1 AND checkpoint IS NOT NULL "
+            "AND (opened_at, name) < "
             "(SELECT opened_at, name FROM segments WHERE glider = ?1 "
             "ORDER BY opened_at DESC, name DESC LIMIT 1 OFFSET ?2)",
             (glider, RECENT - 1),
         ).fetchall()
         self._db.executemany(
-            f"UPDATE segments SET checkpoint = NULL WHERE glider = ? AND name = ? "
-            f"AND milestone != {retention.FIRST}",
-            [(glider, row[0]) for row in rows if not _is_milestone(row[0])],
+            f"UPDATE segments SET checkpoint = NULL WHERE glider = ? AND opened_at = ? AND name = ? "
+            f"AND milestone != {FIRST}",
+            [(glider, *row) for row in rows if not _is_milestone(row["name"])],
         )
 
 

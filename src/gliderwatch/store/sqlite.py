@@ -5,12 +5,14 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from gliderwatch.model import Alert, Assessment, Expected, Incident, SegmentId, Unusable
+from gliderwatch.navigation.clock import SAME_OPENING, ClockStep
 from gliderwatch.pipeline import Outcome
 from gliderwatch.rules.announce import Said
-from gliderwatch.store import codec, outbox, retention
+from gliderwatch.store import clocks, codec, outbox, retention
 from gliderwatch.store.calls import Calls
 from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, read_only
 from gliderwatch.store.known import Known
@@ -43,6 +45,11 @@ class Store:
     def reading(cls, path: Path) -> Store:
         """The store at a path, for looking only. Raises StateError where there is none."""
         return cls(read_only(path), path)
+
+    @property
+    def folder(self) -> Path | None:
+        """The folder of the state file; None of one in memory."""
+        return None if self._path == MEMORY else Path(self._path).parent
 
     def close(self) -> None:
         """Give the connection back."""
@@ -96,6 +103,11 @@ class Store:
         row = self._db.execute("SELECT * FROM files WHERE path = ?", (path,)).fetchone()
         return file_of(row) if row is not None else None
 
+    def noted_at(self, path: str) -> float | None:
+        """When it was last written down what became of a path (s); None where the ledger has it not."""
+        row = self._db.execute("SELECT noted_at FROM files WHERE path = ?", (path,)).fetchone()
+        return None if row is None else float(row[0])
+
     def files(self, *statuses: Status) -> list[File]:
         """The files of some statuses, by path."""
         marks = ",".join("?" * len(statuses))
@@ -117,7 +129,8 @@ class Store:
 
     def is_past(self, identity: SegmentId) -> bool:
         """Whether a segment is older than what is kept of its glider (`state.keep_days`)."""
-        return retention.is_past(self._db, identity)
+        opened_at = identity.opened_at + clocks.offset(self._db, identity)
+        return retention.is_past(self._db, replace(identity, opened_at=opened_at))
 
     def remove(self, before: float) -> Iterator[int]:
         """`retention.remove` of all gliders, in steps."""
@@ -142,13 +155,19 @@ class Store:
         )
 
     def hear(self, identity: SegmentId, last_t: float | None, now: float) -> None:
-        """Note a sign of life: a file of a segment came, with its last sample (s) if it was read."""
-        self._db.execute(
-            "INSERT INTO heard VALUES (?, ?, ?, ?, ?) ON CONFLICT (glider, segment) DO UPDATE SET "
-            "opened_at = excluded.opened_at, at = min(at, excluded.at), "
-            "last_t = max(coalesce(last_t, excluded.last_t), coalesce(excluded.last_t, last_t))",
-            (identity.glider, identity.name, identity.opened_at, last_t, now),
+        """Note a sign of life: a file of a segment came, with its last sample (s) if it was read; by the
+        glider's clock."""
+        known = self._db.execute(
+            "UPDATE heard SET opened_at = ?3 + clock_offset, at = min(at, ?5), last_t = max("
+            "coalesce(last_t, ?4 + clock_offset), coalesce(?4 + clock_offset, last_t)) "
+            "WHERE glider = ?1 AND segment = ?2 AND abs(opened_at - clock_offset - ?3) <= ?6",
+            (identity.glider, identity.name, identity.opened_at, last_t, now, SAME_OPENING),
         )
+        if not known.rowcount:
+            self._db.execute(
+                "INSERT INTO heard (glider, segment, opened_at, last_t, at) VALUES (?, ?, ?, ?, ?)",
+                (identity.glider, identity.name, identity.opened_at, last_t, now),
+            )
 
     def assessments(self, glider: str) -> list[Assessment]:
         """All of a glider, in order of time."""
@@ -159,6 +178,10 @@ class Store:
     def incidents(self, glider: str) -> list[Incident]:
         """All of a glider, in order of time."""
         return list(self.known(glider).incidents())
+
+    def clock_steps(self, glider: str) -> list[ClockStep]:
+        """Where the clock of a glider was set back, or is right again, in order of time."""
+        return clocks.steps(self._db, glider)
 
     def known(self, glider: str) -> Known:
         """What is known of a glider, for the rules."""

@@ -123,11 +123,11 @@ def waiting(state: Path) -> dict[str, Waiting]:
 
 
 def last_files(state: Path, gliders: Iterable[str]) -> dict[str, float]:
-    """When the newest file of each glider came (s)."""
-    sql = "SELECT at FROM heard WHERE glider = ? ORDER BY opened_at DESC LIMIT 1"
+    """When the last file of each glider came (s), whatever its date."""
+    sql = "SELECT max(at) FROM heard WHERE glider = ?"
     with reading(state) as db:
-        found = {glider: db.execute(sql, (glider,)).fetchone() for glider in gliders}
-    return {glider: row[0] for glider, row in found.items() if row is not None}
+        found = {glider: db.execute(sql, (glider,)).fetchone()[0] for glider in gliders}
+    return {glider: at for glider, at in found.items() if at is not None}
 
 
 def operator_messages(state: Path, prefix: str) -> dict[str, float]:

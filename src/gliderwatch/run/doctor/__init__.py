@@ -9,14 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from gliderwatch.config import Config, Problem, check, load
+from gliderwatch.config import Config, Problem, load
 from gliderwatch.errors import ConfigError
+from gliderwatch.run import preconditions
 from gliderwatch.run.doctor import data, machine, service
 from gliderwatch.run.doctor.finding import Finding, as_lines, error, exit_code, ok, report, summary
 
-__all__ = ["DEFAULT", "Finding", "as_lines", "examine", "exit_code", "report", "summary"]
-
-DEFAULT = Path("/etc/gliderwatch/gliderwatch.yml")
+__all__ = ["Finding", "as_lines", "examine", "exit_code", "report", "summary"]
 
 
 def examine(path: Path, *, send: bool = False) -> Iterator[Finding]:
@@ -44,7 +43,7 @@ def examine(path: Path, *, send: bool = False) -> Iterator[Finding]:
     yield from _safely("disk", lambda: machine.disk(config, least))
     yield from _safely("state", lambda: service.state(config, problems))
     yield from _safely("channels", lambda: service.channels(config, problems, send))
-    yield from _safely("heartbeat", lambda: service.sign(config))
+    yield from _safely("heartbeat", lambda: service.sign(config, problems))
     yield from _safely("service", lambda: service.daemon(config))
 
 
@@ -59,7 +58,7 @@ def _safely(topic: str, look: Callable[[], Iterable[Finding]]) -> Iterator[Findi
 
 def _checked(config: Config, path: Path, problems: list[Problem]) -> Iterator[Finding]:
     """Folders and permissions; `problems` gets all that `check` finds."""
-    problems += check(config, path)
+    problems += preconditions.check(config, path)
     found = service.of_check("folders", problems, "dockserver", "gliders")
     yield from found or [ok("folders", "all are there and can be read")]
 

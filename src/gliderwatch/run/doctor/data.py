@@ -10,10 +10,11 @@ from itertools import islice
 from pathlib import Path
 
 from gliderwatch.config import Config, expand
-from gliderwatch.errors import GliderwatchError
-from gliderwatch.ingest.caches import Staging, find_cache
+from gliderwatch.errors import GliderwatchError, MissingCache
+from gliderwatch.ingest.caches import Staging
 from gliderwatch.ingest.cycles import parse_sensor_list
 from gliderwatch.ingest.header import Header, parse_header, plain, read_header, read_regular
+from gliderwatch.ingest.lists import lists_folder
 from gliderwatch.ingest.scan import Found, find_places, scan
 from gliderwatch.run.doctor.finding import Findings, error, note, ok, warning
 
@@ -39,7 +40,7 @@ WANTED = {
     ("m_heading",): "the commanded heading stands in; a compass fault goes unseen",
     ("m_water_vx", "m_initial_water_vx"): _NO_CURRENT,
     ("m_water_vy", "m_initial_water_vy"): _NO_CURRENT,
-    ("m_depth",): "drift is told from flight by pitch alone; no rate of dive and climb",
+    ("m_depth", "m_pressure"): "drift is told from flight by pitch alone; no rate of dive and climb",
     ("m_pitch",): "no asymmetry of dive and climb; drift is told by depth alone",
     ("m_roll",): "no sign of a lost wing or of what hangs on one side",
 }
@@ -105,22 +106,31 @@ def names(config: Config, files: Inventory) -> Findings:
 
 
 def caches(config: Config, files: Inventory) -> Findings:
-    """Cache files that are missing for the files that are there."""
-    folders = expand(config.dockserver.cache)
+    """Cache files that are missing for the files that are there, or cannot be used."""
+    folders, staging = _list_folders(config), Staging()
+    own = {header.crc for header in files.headers.values() if not header.factored}
     lacking: Counter[str] = Counter()
     examples: dict[str, Path] = {}
     for path, header in files.headers.items():
-        if header.factored and header.id.glider in config.gliders:
+        if header.factored and header.id.glider in config.gliders and header.crc not in own:
             lacking[header.crc] += 1
             examples.setdefault(header.crc, path)
-    missing = {crc: n for crc, n in lacking.items() if find_cache(crc, folders) is None}
-    for crc, n in islice(missing.items(), _SHOWN):
-        where = folders[0] if folders else "a folder of dockserver.cache"
-        text = f"{crc}.cac is missing for {n} files, such as {examples[crc]}"
-        yield error("caches", text, f"copy it from the dockserver or the glider to {where}")
-    if len(missing) > _SHOWN:
-        yield error("caches", f"and {len(missing) - _SHOWN} more", "copy them in the same way")
-    if not missing:
+    found: list[tuple[str, str]] = []
+    for crc, n in lacking.items():
+        try:
+            staging.get(files.headers[examples[crc]], folders)
+        except MissingCache:
+            where = folders[0] if config.dockserver.cache else "a folder of dockserver.cache"
+            text = f"{crc}.cac is missing for {n} files, such as {examples[crc]}"
+            found.append((text, f"copy it from the dockserver or the glider to {where}"))
+        except GliderwatchError as problem:
+            wrong, _, cure = str(problem).rpartition("; ")
+            found.append((f"{n} files wait, such as {examples[crc]}: {wrong}", cure))
+    for text, cure in found[:_SHOWN]:
+        yield error("caches", text, cure)
+    if len(found) > _SHOWN:
+        yield error("caches", f"and {len(found) - _SHOWN} more", "copy them in the same way")
+    if not found:
         read = f"the newest {len(files.headers)}" if files.is_cut else str(len(files.headers))
         yield ok("caches", f"none is missing (headers of {read} files read)")
     for text in files.unreadable[:_SHOWN]:
@@ -129,9 +139,14 @@ def caches(config: Config, files: Inventory) -> Findings:
         yield note("files", f"and {len(files.unreadable) - _SHOWN} more that are of no use")
 
 
+def _list_folders(config: Config) -> tuple[Path, ...]:
+    """Where the service looks for sensor lists."""
+    return (*expand(config.dockserver.cache), lists_folder(Path(config.state.path)))
+
+
 def sensors(config: Config, files: Inventory) -> Findings:
     """Sensors that the newest real-time file of each glider leaves out, and what is lost by it."""
-    folders, staging = tuple(expand(config.dockserver.cache)), Staging()
+    folders, staging = _list_folders(config), Staging()
     for name in sorted(config.gliders):
         own = {p: h for p, h in files.headers.items() if h.id.glider == name}
         if not own:

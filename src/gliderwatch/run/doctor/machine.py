@@ -7,18 +7,19 @@ import os
 import platform
 import pwd
 import shutil
+import stat
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from itertools import islice
 from pathlib import Path
 
 from gliderwatch import __version__
 from gliderwatch.alerts.words import duration, utc
 from gliderwatch.config import Config, expand
-from gliderwatch.run.doctor.finding import Findings, error, note, ok, warning
+from gliderwatch.run.doctor.finding import Finding, Findings, error, note, ok, warning
 
 PYTHON = (3, 11)
 _LIMITS = Path("/proc/sys/fs/inotify")
@@ -27,6 +28,12 @@ _MOST = 1_000_000
 """Folders that are counted at the most."""
 _REMOTE = ("nfs", "cifs", "smb", "fuse.sshfs", "9p", "afs", "ceph", "glusterfs", "lustre")
 _FULL = 0.8
+_GROUP_BITS = {"r": stat.S_IRGRP, "x": stat.S_IXGRP}
+_PRIVILEGED = frozenset(
+    {"adm", "admin", "daemon", "disk", "docker", "incus-admin", "kmem", "libvirt", "lxd", "root", "shadow"}
+    | {"ssl-cert", "staff", "sudo", "sys", "systemd-journal", "wheel"}
+)
+"""Groups whose members may do more than read the files of a dockserver."""
 _RELEASED = 1_767_225_600.0
 """2026-01-01: a clock before it is wrong."""
 _LATE = 300.0
@@ -56,25 +63,52 @@ def user(config: Config) -> Findings:
         yield ok("user", f"{name}, groups {groups}")
     patterns = [*config.dockserver.roots, *config.dockserver.cache]
     patterns += [path for glider in config.gliders.values() for path in glider.paths]
-    closed: dict[int, Path] = {}
+    closed: dict[Path, Finding] = {}
     for folder in expand(patterns):
         for part in (*reversed(folder.parents), folder):
+            needed = "x" if part != folder else "rx"
             if not os.access(part, os.X_OK if part != folder else os.R_OK | os.X_OK):
-                closed.setdefault(part.stat().st_gid, part)
+                closed.setdefault(part, _closed(part, needed, name, mine))
                 break
-    for gid, folder in closed.items():
-        if gid in mine:
-            yield error("user", f"{folder} is closed to its group {_group(gid)}", f"chmod g+rx {folder}")
-        elif gid in os.getgrouplist(name, os.getegid()):
-            text = f"{name} is in group {_group(gid)} of {folder}, but not yet here"
-            yield error("user", text, "log in again; restart the service")
-        else:
-            yield error(
-                "user",
-                f"{name} is not in group {_group(gid)}, which {folder} belongs to",
-                f"SupplementaryGroups={_group(gid)} in the unit (systemctl edit gliderwatch), or "
-                f"usermod -aG {_group(gid)} {name}",
-            )
+    yield from closed.values()
+
+
+def _closed(folder: Path, needed: str, name: str, mine: Collection[int]) -> Finding:
+    """Why a folder is closed to the user `name` with the groups `mine`, and what opens it.
+
+    Nobody is to join a group that may do more than read data: there an access control list lets him in.
+    """
+    try:
+        status = folder.stat()
+    except OSError as problem:
+        cure = "correct the path in the configuration, or mend the link"
+        return error("user", f"{folder} cannot be looked at: {problem.strerror}", cure)
+    gid, group, mode = status.st_gid, _group(status.st_gid), stat.S_IMODE(status.st_mode)
+    is_open = all(mode & _GROUP_BITS[bit] for bit in needed)
+    if status.st_uid == os.geteuid():
+        return error("user", f"{folder} is closed to its owner {name}", f"chmod u+{needed} {folder}")
+    if gid in mine and not is_open:
+        return error("user", f"{folder} is closed to its group {group}", f"chmod g+{needed} {folder}")
+    if gid in mine or gid == 0 or group in _PRIVILEGED or not is_open:
+        owner = f"{_name(status.st_uid)}:{group}, mode {mode:04o}"
+        return error("user", f"{folder} ({owner}) is closed to {name}", _acl(folder, needed, name))
+    if gid in os.getgrouplist(name, os.getegid()):
+        text = f"{name} is in group {group} of {folder}, but not yet here"
+        return error("user", text, "log in again; restart the service")
+    return error(
+        "user",
+        f"{name} is not in group {group}, which {folder} belongs to",
+        f"SupplementaryGroups={group} in the unit (systemctl edit gliderwatch), or "
+        f"usermod -aG {group} {name}",
+    )
+
+
+def _acl(folder: Path, needed: str, name: str) -> str:
+    """The command that lets one user through a folder, or read all that is and will be in it."""
+    who = f"u:{name}"
+    if needed == "x":
+        return f"setfacl -m {who}:x {folder}"
+    return f"setfacl -R -m {who}:rX {folder}; setfacl -R -d -m {who}:rX {folder}"
 
 
 def inotify(config: Config) -> Findings:

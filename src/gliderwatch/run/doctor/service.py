@@ -9,15 +9,15 @@ from pathlib import Path
 
 from gliderwatch.alerts import message
 from gliderwatch.alerts.channels import Channel, DeliveryError
+from gliderwatch.alerts.samples import sample
 from gliderwatch.alerts.words import duration
-from gliderwatch.config import Config, Problem, references
+from gliderwatch.config import Config, Problem
 from gliderwatch.errors import ConfigError, DamagedError, StateError
-from gliderwatch.model import Severity
-from gliderwatch.run import heartbeat
+from gliderwatch.model import Alert, Kind, Severity
 from gliderwatch.run.doctor.finding import Finding, Findings, Level, error, note, ok, warning
 from gliderwatch.run.life import STALE, is_held, silence
 from gliderwatch.store.database import SCHEMA
-from gliderwatch.store.watch_health import failing, quick_check, schema_version
+from gliderwatch.store.watch_health import Failing, failing, quick_check, schema_version
 
 _START = "systemctl start gliderwatch; journalctl -u gliderwatch tells why it ended"
 _STUCK = "systemctl restart gliderwatch; please report it, with its log"
@@ -39,8 +39,11 @@ def of_check(topic: str, problems: Iterable[Problem], *keys: str) -> list[Findin
 
 def state(config: Config, problems: Iterable[Problem]) -> Findings:
     """Whether the state file opens, is whole, and of a schema that is known."""
-    yield from of_check("state", problems, "state.")
+    found = of_check("state", problems, "state.")
+    yield from found
     path = Path(config.state.path)
+    if any(f.level == Level.ERROR for f in found):
+        return
     if not path.exists():
         yield note("state", f"{path} is not there yet: the service makes it at its first start")
         return
@@ -62,10 +65,11 @@ def state(config: Config, problems: Iterable[Problem]) -> Findings:
 
 def channels(config: Config, problems: Iterable[Problem], send: bool) -> Findings:
     """Whether channels can be reached and do deliver; with `send`, a test message goes through each."""
-    found = of_check("channels", problems, "channels", "recipients")
-    yield from found
-    bad = {f.text.split(".")[1] for f in found if ": channels." in f.text and f.level == Level.ERROR}
-    waiting = failing(Path(config.state.path), time.time()) if Path(config.state.path).exists() else {}
+    problems = list(problems)
+    yield from of_check("channels", problems, "channels", "recipients")
+    urls = {name: f"channels.{name}.url: " for name in config.channels}
+    bad = {name for name, key in urls.items() if any(p.text.startswith(key) for p in problems)}
+    waiting = _failing(Path(config.state.path))
     for name in config.channels:
         trouble = waiting.get(name)
         if name in bad:
@@ -84,32 +88,42 @@ def channels(config: Config, problems: Iterable[Problem], send: bool) -> Finding
             yield ok("channels", f"{name} {said}")
 
 
-def sign(config: Config) -> Findings:
-    """Whether a sign of life can be given to a dead man's switch."""
-    settings = config.heartbeat
-    template = settings.url.get_secret_value() if settings.url is not None else ""
-    found = []
+def _failing(path: Path) -> dict[str, Failing]:
+    """Channels that fail, as the state file tells; none where it cannot: `state` says why."""
     try:
-        heartbeat.url(config)
-    except ConfigError as problem:
-        if references.needs_credentials(template) and references.CREDENTIALS not in os.environ:
-            cure = "credentials are only there inside of the service"
-            found.append(warning("heartbeat", str(problem), cure))
-        else:
-            found.append(error("heartbeat", str(problem), "correct it: the service does not start with it"))
+        return failing(path, time.time()) if path.exists() else {}
+    except StateError:
+        return {}
+
+
+def sign(config: Config, problems: Iterable[Problem]) -> Findings:
+    """Whether a sign of life can be given to a dead man's switch."""
+    settings, found = config.heartbeat, of_check("heartbeat", problems, "heartbeat.")
     if settings.file is not None:
         file = Path(settings.file)
         if not os.access(file if file.exists() else file.parent, os.W_OK):
             found.append(error("heartbeat", f"{file} cannot be written by this user", "name another file"))
-    if not found and (template or settings.file is not None):
+    if not found and (settings.url is not None or settings.file is not None):
         found = [ok("heartbeat", f"every {settings.minutes:g} min while all is well")]
     yield from found
 
 
-def try_channel(config: Config, name: str) -> str | None:
-    """Send a test message; why it was not delivered, None when it was."""
-    now = time.time()
-    alert = message.operator(
+def sample_for(kind: str) -> Alert:
+    """A whole message of a kind, as it would come now."""
+    return sample(Kind(kind), time.time())
+
+
+def try_channel(config: Config, name: str, alert: Alert | None = None) -> str | None:
+    """Send a test message, or an `alert`; why it was not delivered, None when it was."""
+    try:
+        Channel(name, config.channel_url(name).get_secret_value()).send(alert or _test(name, time.time()))
+    except (DeliveryError, ConfigError) as problem:
+        return str(problem)
+    return None
+
+
+def _test(name: str, now: float) -> Alert:
+    return message.operator(
         "test of a channel",
         f"If you can read this, the channel {name} of gliderwatch works.",
         now,
@@ -117,11 +131,6 @@ def try_channel(config: Config, name: str) -> str | None:
         severity=Severity.INFO,
         audience=Severity.INFO,
     )
-    try:
-        Channel(name, config.channel_url(name).get_secret_value()).send(alert)
-    except (DeliveryError, ConfigError) as problem:
-        return str(problem)
-    return None
 
 
 def _reached(config: Config, name: str) -> tuple[str, str | None]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from gliderwatch.alerts.words import clean, utc
 from gliderwatch.model import Assessment, Flag, Incident
-from gliderwatch.rules.announce import SPEED_CHANGE
+from gliderwatch.rules.constants import SPEED_CHANGE
 from gliderwatch.store.sqlite import Store
 
 _MOST = 50

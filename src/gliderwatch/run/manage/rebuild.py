@@ -14,6 +14,7 @@ from gliderwatch.config.paths import is_folder
 from gliderwatch.errors import GliderwatchError, Quarantine, StateError
 from gliderwatch.ingest import names
 from gliderwatch.ingest.decode import Decoder
+from gliderwatch.ingest.lists import lists_folder
 from gliderwatch.model import Segment, SegmentId
 from gliderwatch.rules.announce import as_told
 from gliderwatch.run import arrivals, intake
@@ -90,6 +91,7 @@ def _alone(path: Path, keep: bool) -> Iterator[None]:
 def _fill(work: _Work, paths: Sequence[str], held: Sequence[SegmentId], on_step: Progress) -> None:
     """Assess all in the order of time; of one segment the files first, the fullest before the others."""
     caches = [folder for folder in expand(work.config.dockserver.cache) if is_folder(folder)]
+    caches.append(lists_folder(Path(work.config.state.path)))
     steps: list[tuple[SegmentId, Job | None]] = [(identity, None) for identity in held]
     steps += [(job.header.id, job) for job in _jobs(work, paths, caches)]
     steps.sort(key=_turn)
@@ -121,11 +123,9 @@ def _turn(step: tuple[SegmentId, Job | None]) -> tuple[SegmentId, int, str]:
 
 def _fuller(work: _Work, identity: SegmentId) -> Segment | None:
     """The segment held, if it holds more than the files that are still there."""
-    there = work.new.segments.completeness(identity.glider, identity.name)
-    held = work.old.segments.completeness(identity.glider, identity.name)
-    if held is None or (there is not None and there >= held):
-        return None
-    return work.old.segments.get(identity)
+    segment = work.old.segments.as_sent(identity)
+    there = work.new.segments.completeness(segment.id)
+    return None if there is not None and there >= segment.completeness else segment
 
 
 def _take(work: _Work, file: File, segment: Segment | GliderwatchError, following: int, ocean: Ocean) -> None:

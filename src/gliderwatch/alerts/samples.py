@@ -1,0 +1,172 @@
+"""Whole messages about a glider that does not exist, to see how they arrive. Pure.
+
+Each is made as the real ones are, and says in its title and its first line that it is a sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from gliderwatch.alerts import message, overdue, unknown
+from gliderwatch.alerts.page import with_lead
+from gliderwatch.model import Alert, Assessment, Expected, Flag, Hindrance, Incident, Kind, Severity
+
+GLIDER = "sample-glider"
+_LEAD = "This is a sample, sent by `gliderwatch test-alert`: there is no such glider, and nothing is wrong."
+_HOUR = 3600.0
+_SLOW = Assessment(
+    glider=GLIDER,
+    segment=f"{GLIDER}-2026-1-0-7",
+    t_dive=-3.4 * _HOUR,
+    t_surface=0.0,
+    lat=24.20575,
+    lon=-83.02057,
+    flag=Flag.ANOMALY,
+    reason="",
+    speed=0.112,
+    speed_min=0.22,
+    speed_max=0.30,
+    flow_u=0.15,
+    flow_v=0.17,
+    reference_u=0.13,
+    reference_v=0.16,
+    reference_final=True,
+    p_e=0.031,
+    gamma_f=0.3,
+    clle_max=None,
+    excitation=None,
+    n_samples=812,
+    evidence={
+        "duration_h": 3.4,
+        "along_speed": 0.115,
+        "depth_max": 182.0,
+        "pitch_dive": -0.45,
+        "pitch_climb": 0.30,
+        "roll_mean": 0.31,
+        "speed_before": 0.256,
+    },
+    notes=(),
+    parameters="",
+)
+_HEALTHY = replace(_SLOW, flag=Flag.NORMAL, speed=0.251, p_e=0.02, evidence={"duration_h": 3.4})
+_DISAGREE = replace(
+    _SLOW,
+    flag=Flag.FALSE_ALARM,
+    p_e=0.412,
+    reference_u=-0.3,
+    reference_v=-0.2,
+    evidence={"duration_h": 3.4, "across_misfit": 0.31, "along_speed": 0.02},
+)
+
+
+def sample(kind: Kind, now: float) -> Alert:
+    """A message of a kind as it would be made at `now` (s)."""
+    alert = SAMPLES[kind](now)
+    return replace(
+        alert,
+        id=f"sample/{kind}/{now:.3f}",
+        incident="",
+        title=f"SAMPLE {alert.title}",
+        body=f"{_LEAD}\n\n{alert.body}",
+        html=with_lead(alert.html, _LEAD),
+    )
+
+
+def _at(dive: Assessment, now: float) -> Assessment:
+    return replace(dive, t_dive=now + dive.t_dive, t_surface=now + dive.t_surface)
+
+
+def _incident(kind: Kind, worst: Assessment, severity: Severity) -> Incident:
+    since = worst.t_dive
+    return Incident("", GLIDER, kind, severity, since, worst.t_surface, None, 2, worst, worst)
+
+
+def _opened(kind: Kind, dive: Assessment, severity: Severity) -> Callable[[float], Alert]:
+    def make(now: float) -> Alert:
+        worst = _at(dive, now)
+        return message.opened(_incident(kind, worst, severity), worst, alert_id="", audience=severity)
+
+    return make
+
+
+def _all_clear(now: float) -> Alert:
+    worst = _at(_SLOW, now - 8 * _HOUR)
+    over = replace(_incident(Kind.ANOMALY, worst, Severity.CRITICAL), cleared_at=now)
+    return message.all_clear(over, _at(_HEALTHY, now), alert_id="", audience=Severity.CRITICAL)
+
+
+def _reminder(now: float) -> Alert:
+    incident = _incident(Kind.ANOMALY, _at(_SLOW, now - 24 * _HOUR), Severity.CRITICAL)
+    return message.reminder(incident, _at(_SLOW, now), 24.0, alert_id="", audience=Severity.CRITICAL)
+
+
+def _correction(now: float) -> Alert:
+    dive = _at(_SLOW, now - 4 * _HOUR)
+    return message.correction(
+        _incident(Kind.ANOMALY, dive, Severity.CRITICAL),
+        None,
+        replace(dive, flag=Flag.NORMAL, speed=0.24),
+        "the depth-averaged current of the dive was corrected",
+        alert_id="",
+        audience=Severity.CRITICAL,
+    )
+
+
+def _overdue(now: float) -> Alert:
+    last = _at(_HEALTHY, now - 9 * _HOUR)
+    expected = last.t_surface + 4 * _HOUR
+    absence = overdue.Absence(
+        glider=GLIDER,
+        now=now,
+        heard=last.t_surface,
+        awaited=expected,
+        lat=24.21,
+        lon=-83.01,
+        area=overdue.Area(24.24, -82.99, 9200.0, 6100.0, 48.0),
+        last=last,
+        incidents=(),
+        fleet=overdue.Fleet(2, 0, now - _HOUR),
+    )
+    return overdue.overdue(absence, alert_id="", thread="", severity=Severity.WARNING, first=True)
+
+
+def _unknown(now: float) -> Alert:
+    words = "cache file 0a1b2c3d.cac is missing: not in /var/opt/gmc/cache"
+    waits = [
+        unknown.Unjudged(now - start * _HOUR, now - end * _HOUR, Hindrance.NO_CACHE, words, "0a1b2c3d")
+        for start, end in ((23, 20), (19, 16), (15, 12), (11, 8), (7, 4), (3, 0))
+    ]
+    found = unknown.Blindness(GLIDER, now - 24 * _HOUR, now, now - 24 * _HOUR, tuple(waits))
+    return unknown.blind(found, alert_id="", thread="", first=True)
+
+
+def _surfacing(now: float) -> Alert:
+    expected = Expected(now, now + 4 * _HOUR, 1500.0, 24.21, -83.01, 1e6, 0.0, 1e6, "its last dives")
+    dive = _at(_HEALTHY, now)
+    return message.surfacing(dive, now - 4 * _HOUR, alert_id="", expected=expected)
+
+
+def _operator(now: float) -> Alert:
+    return message.operator(
+        "no file of any glider for 26.0 h",
+        "Check the dockserver, its modems and telephone lines, and the share that its folders are on.",
+        now,
+        alert_id="",
+        severity=Severity.WARNING,
+        audience=Severity.WARNING,
+    )
+
+
+SAMPLES: dict[Kind, Callable[[float], Alert]] = {
+    Kind.ANOMALY: _opened(Kind.ANOMALY, _SLOW, Severity.CRITICAL),
+    Kind.FALSE_ALARM: _opened(Kind.FALSE_ALARM, _DISAGREE, Severity.WARNING),
+    Kind.OVERDUE: _overdue,
+    Kind.UNKNOWN: _unknown,
+    Kind.ALL_CLEAR: _all_clear,
+    Kind.REMINDER: _reminder,
+    Kind.CORRECTION: _correction,
+    Kind.SURFACING: _surfacing,
+    Kind.OPERATOR: _operator,
+}
+"""How the sample of each kind is made at a time (s)."""

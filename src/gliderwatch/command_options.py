@@ -1,0 +1,71 @@
+"""What the commands share: options, how they fail, and a group whose help is whole."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import NoReturn
+
+import click
+from rich.console import Console
+from rich.text import Text
+
+from gliderwatch.errors import GliderwatchError
+
+DEFAULT = Path("/etc/gliderwatch/gliderwatch.yml")
+"""The configuration where none is named."""
+FILE = click.Path(dir_okay=False, path_type=Path)
+FOLDER = click.Path(exists=True, path_type=Path)
+
+
+def configured(path: Path) -> Path:
+    """The configuration that is named, or the usual one. Raises UsageError where that is not there."""
+    if path == DEFAULT and not path.exists():
+        raise click.UsageError(f"there is no configuration {DEFAULT}: name yours with -c")
+    return path
+
+
+config_option = click.option(
+    "-c",
+    "--config",
+    "config_path",
+    type=FILE,
+    default=DEFAULT,
+    callback=lambda _context, _option, path: configured(path),
+    help="The YAML configuration.",
+    show_default=True,
+)
+json_option = click.option("--json", "as_json", is_flag=True, help="For machines.")
+
+
+def example(*lines: str) -> str:
+    """Examples of a command, for the end of its help; they keep their lines."""
+    return "\b\n" + "\n".join(
+        ["Example:" if len(lines) == 1 else "Examples:", *(f"  {line}" for line in lines)]
+    )
+
+
+class Group(click.Group):
+    """The group of all commands: errors on purpose are told in words, and help is never cut."""
+
+    def invoke(self, ctx: click.Context) -> object:
+        """Run a command; ends with 2 where it says why it cannot."""
+        try:
+            return super().invoke(ctx)
+        except GliderwatchError as error:
+            _fail(str(error))
+        except BrokenPipeError:  # `| head` has seen enough: click ends without a word
+            raise
+        except OSError as error:  # a full disk, a folder that is closed
+            _fail(f"cannot go on: {error}")
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """All commands with the first sentence of their help, in as many lines as it takes."""
+        commands = [self.commands[name] for name in self.list_commands(ctx)]
+        with formatter.section("Commands"):
+            formatter.write_dl([(c.name or "", c.get_short_help_str(limit=1000)) for c in commands])
+
+
+def _fail(text: str) -> NoReturn:
+    Console(stderr=True).print(Text(text), soft_wrap=True)
+    sys.exit(2)

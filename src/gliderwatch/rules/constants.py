@@ -1,0 +1,86 @@
+"""The heuristics of the rules, each with its unit, what it is for, and where it comes from. Pure.
+
+What a pilot may set stands in `params`. Where no source is named the value is a judgement, and the tests
+named by `benchmarks/mutations.py` pin what it is for.
+"""
+
+# Incidents
+SEVERE = 0.5
+"""Part of the lower bound of the normal range: a speed below it needs fewer dives to open an incident."""
+WORSE_SPEED = 0.05
+"""m/s further out of the normal range than when it was acknowledged: an anomaly has grown worse."""
+WORSE_FLOW_ERROR = 0.1
+"""Of the flow error p_E: the same for measurements that disagree."""
+
+# What is announced
+NEWS = 86400.0
+"""s: an incident that was over for longer when it became known is history, not news."""
+SPEED_CHANGE = 0.05
+"""m/s: a smaller change of a speed that was announced is not worth a correction."""
+FLOW_CHANGE = 0.05
+"""m/s, a component: the same for the reference flow."""
+MESSAGE_LATE = 900.0
+"""s: a message made later than that after its time speaks of now (the service was off), an earlier one of its
+time, so that live and replay say the same."""
+
+# When a glider is overdue
+LEAST_MARGIN = 3 * 3600.0
+"""s by which a healthy glider may be late."""
+LONGEST_CALL = 2400.0
+"""s that a call takes at the most: its files come when it ends, not at the surfacing."""
+SHORTEST_INTERVAL = 1200.0
+"""s: files opened closer together are of one call."""
+TIME_SIGMAS = 3.0
+"""Standard errors of the expected time that belong to the margin."""
+MARGIN_GROWTH = 2.0
+"""A glider becomes overdue again after one, two, four, ... margins."""
+FILES_KEPT = 8
+"""Files from which the interval is guessed where dives do not show it."""
+LOSSY = 3.0
+"""Intervals from file to file, above which it was a silence and not one or two files that were lost."""
+GUESSED_SIGMA = 0.5
+"""Part of an interval guessed from files: the standard error of its end."""
+SAME_CALL = 0.25
+"""Part of an interval: what comes so soon after the call last heard belongs to it."""
+LATER_CALL = 0.5
+"""Part of an interval: a sign of life later than this after a surfacing is of another call."""
+
+# Whether a deployment goes on
+FRESH = 2 * 86400.0
+"""s: a file that came longer after its end is history, no news of a glider at sea."""
+GONE = 30 * 86400.0
+"""s of silence after which a deployment counts as over."""
+RECENT = GONE + 2 * 86400.0
+"""s: files opened before are no sign of life of the last 30 days; none is open for two days."""
+
+# Where a silent glider drifts (the current forgets in `estimation.flow.FlowParams.memory`)
+FLOW_SIGMA = 0.15
+"""m/s, a component: how far current and wind drift come to differ from the last known current. 0.11 is
+sqrt(2) times the 0.08 of the current itself; the rest is allowed for the wind at the surface."""
+UNKNOWN_FLOW = 2.0
+"""Times `FLOW_SIGMA` where no current is known."""
+
+# When nothing can be judged
+DEPLOYMENT_HOURS = 24.0
+"""h that separate two deployments where `unknown_hours` is not given."""
+UNJUDGED_INTERVALS = 2.0
+"""Intervals between surfacings until a dive is judged, at most: the fix that ends it, and its current, come
+with the file after it."""
+REMINDER_GROWTH = 2.0
+"""Reminders come after 1, 2 and 4 times `reminder_hours`,"""
+THINNED = 7.0
+"""then each time after so many of them: once a week where they are daily."""
+
+# When an incident opens, and is over
+WELL = 0.3
+"""Part of the way from the lower bound to the usual speed from which an open anomaly is over."""
+SURELY = 2.0
+"""Standard errors by which a speed must be below normal for one dive alone to be severe."""
+
+# Reminders of what is open
+MARKS = (1.0, 2.0, 4.0, 7.0)
+"""Days after which an open incident is brought to mind,"""
+WEEK = 7.0
+"""and then each time after so many days."""
+SLACK = 0.2
+"""Of a day: so much sooner a reminder may come; surfacings do not fall on full days."""

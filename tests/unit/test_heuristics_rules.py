@@ -1,0 +1,206 @@
+"""The heuristics of the rules do what their page says: each case lies just on one side of a bound."""
+
+from dataclasses import replace
+
+import pytest
+
+from alert_support import DISAGREE, SLOW, incident
+from announcing import Talk as Announcer
+from announcing import World, dive
+from gliderwatch.alerts.unknown import Unjudged
+from gliderwatch.model import Expected, Kind, Unusable
+from gliderwatch.params import Attention
+from gliderwatch.rules.acknowledged import acknowledge
+from gliderwatch.rules.incident import is_severe
+from gliderwatch.rules.overdue import outlook
+from gliderwatch.rules.silence import (
+    Awaited,
+    Sign,
+    awaited,
+    drift,
+    first_call,
+    guess,
+    is_at_sea,
+    margin,
+    rhythm,
+)
+from gliderwatch.rules.unknown import blindness
+from silent import DAY, HOUR, INTERVAL, MARGIN, T0, Clock, Sea, expected
+
+DUE = T0 + INTERVAL + MARGIN
+
+
+def files(n: int, apart: float, first: float = T0) -> list[Sign]:
+    """Files that come one after another, each open until the next."""
+    return [Sign(first + k * apart, first + (k + 1) * apart, first + (k + 1) * apart) for k in range(n)]
+
+
+class TestIncidents:
+    def test_less_than_half_of_the_normal_speed_is_severe(self):
+        low = SLOW.speed_min
+        assert not is_severe(replace(SLOW, speed=0.55 * low))
+        assert is_severe(replace(SLOW, speed=0.45 * low))
+
+    @pytest.mark.parametrize("slower, holds", [(0.04, True), (0.06, False)])
+    def test_an_anomaly_has_grown_worse_by_5_cm_s(self, slower, holds):
+        ack = acknowledge(incident(replace(SLOW, speed=0.19, speed_min=0.2)), "ann", "", T0)
+        worse = incident(replace(SLOW, speed=0.19 - slower, speed_min=0.2))
+        assert ack.holds(worse) == holds
+
+    @pytest.mark.parametrize("more, holds", [(0.08, True), (0.12, False)])
+    def test_measurements_disagree_worse_by_a_tenth(self, more, holds):
+        ack = acknowledge(incident(replace(DISAGREE, p_e=0.5), kind=Kind.FALSE_ALARM), "ann", "", T0)
+        assert ack.holds(incident(replace(DISAGREE, p_e=0.5 + more), kind=Kind.FALSE_ALARM)) == holds
+
+
+class TestAnnouncements:
+    @pytest.mark.parametrize("hours, count", [(22, 2), (26, 0)])
+    def test_an_incident_that_was_over_for_a_day_is_history(self, hours, count):
+        world = World.of("01100")
+        last = dive(5, "0", t_dive=dive(4, "0").t_surface, t_surface=dive(4, "0").t_surface + hours * HOUR)
+        cleared = next(i.cleared_at for i in world.incidents())
+        last = replace(last, t_surface=cleared + hours * HOUR)
+        assert len(Announcer().hear(World({**world.dives, last.t_dive: last}))) == count
+
+    def corrections(self, **changes) -> list[str]:
+        """What is said when the last dive of an open incident is known better."""
+        talk, world = Announcer(), World.of("011")
+        assert talk.hear(world) == ["anomaly"]
+        last = max(world.dives)
+        return talk.hear(World({**world.dives, last: replace(world.dives[last], **changes)}))
+
+    def test_a_speed_is_corrected_by_5_cm_s(self):
+        assert self.corrections(speed=0.15 - 0.04) == []
+        assert self.corrections(speed=0.15 - 0.06) == ["correction"]
+
+    def test_so_is_a_reference_flow(self):
+        u = dive(0, "1").reference_u
+        assert self.corrections(reference_u=u + 0.04) == []
+        assert self.corrections(reference_u=u + 0.06) == ["correction"]
+
+    @pytest.mark.parametrize("late, of_its_time", [(800.0, True), (1000.0, False)])
+    def test_a_message_a_quarter_of_an_hour_late_speaks_of_now(self, late, of_its_time):
+        clock = Clock(Sea().call(T0 - INTERVAL).call(T0))
+        assert clock.at(DUE + late) == ["overdue"]
+        assert clock.alerts[0].time == (DUE if of_its_time else DUE + late)
+
+
+class TestOverdue:
+    def test_a_healthy_glider_is_three_hours_late_with_a_call_of_forty_minutes(self):
+        assert margin(expected(t=T0 + HOUR), (), T0, None) == 3 * HOUR + 2400.0
+
+    def test_three_standard_errors_are_waited(self):
+        assert margin(expected(t=T0 + HOUR, t_sigma=2 * HOUR), (), T0, None) == 6 * HOUR + 2400.0
+
+    def test_a_second_message_comes_after_two_margins(self):
+        assert Awaited(0.0, 0.0, 10.0, 5.0).stage(2) == 40.0
+
+    @pytest.mark.parametrize("minutes, found", [(18, False), (22, True)])
+    def test_files_within_twenty_minutes_are_of_one_call(self, minutes, found):
+        assert (rhythm(files(6, 60.0 * minutes), T0 + DAY) is not None) == found
+
+    def test_the_last_eight_files_tell_the_rhythm(self):
+        """Of seven intervals four decide, which are those between five files."""
+        signs = [*files(20, HOUR, T0 - 20 * HOUR), *files(5, 3 * HOUR)]
+        assert rhythm(signs, T0 + 5 * DAY) == 3 * HOUR
+        assert rhythm([*files(20, HOUR, T0 - 20 * HOUR), *files(4, 3 * HOUR)], T0 + 5 * DAY) == HOUR
+
+    @pytest.mark.parametrize("times, counts", [(2.8, True), (3.2, False)])
+    def test_three_intervals_from_file_to_file_were_a_silence(self, times, counts):
+        e = expected(t=T0 + 6 * HOUR)
+        apart = times * 6 * HOUR
+        found = margin(e, files(5, apart, T0 - 5 * apart), T0, None)
+        assert found == pytest.approx((apart if counts else 6 * HOUR) + 2400.0)
+
+    def test_a_guess_is_half_an_interval_unsure(self):
+        found = guess(files(6, 2 * HOUR), T0 + DAY)
+        assert found.t_sigma == HOUR
+
+    def test_what_comes_a_quarter_of_an_interval_later_is_another_call(self):
+        call = Awaited(T0, T0 + 4 * HOUR, DUE, 4 * HOUR)
+        for minutes, heard in ((55, False), (65, True)):
+            t = T0 + 60.0 * minutes
+            sign = Sign(t - 4 * HOUR, t, t)
+            assert (first_call(call, [sign], None, T0 + DAY) is not None) == heard
+
+    def test_a_sign_half_an_interval_after_the_surfacing_puts_the_next_call_off(self):
+        e = expected(t=T0 + 4 * HOUR)
+        for minutes, put_off in ((110, False), (130, True)):
+            t = T0 + 60.0 * minutes
+            call = awaited(e, [Sign(t - 4 * HOUR, t, t)], T0 + 3 * HOUR, None)
+            assert call.t == (t + 4 * HOUR if put_off else e.t)
+
+
+class TestDeployment:
+    @pytest.mark.parametrize("days, at_sea", [(1.9, True), (2.1, False)])
+    def test_a_file_that_is_two_days_old_when_it_comes_is_no_news(self, days, at_sea):
+        assert is_at_sea([Sign(T0, T0 + HOUR, T0 + HOUR + days * DAY)], 0.0, T0 + 3 * DAY) == at_sea
+
+    @pytest.mark.parametrize("days, at_sea", [(29, True), (31, False)])
+    def test_after_a_month_of_silence_it_is_over(self, days, at_sea):
+        assert is_at_sea([Sign(T0, T0, T0)], INTERVAL, T0 + days * DAY) == at_sea
+
+    def test_files_opened_32_days_ago_are_looked_at(self):
+        """One may be open for two days, and so be a sign of the last thirty."""
+        sea = Sea().call(T0)
+        opened = [T0 - days * DAY for days in (31.5, 32.5)]
+        sea.files = [Sign(t, t, t) for t in opened] + sea.files
+        found = outlook(sea, T0)
+        assert found is not None and [s.opened_at in opened for s in found[1]] == [True, False]
+
+
+class TestDrift:
+    def minor(self, flow, hours: float = 1.0) -> float:
+        point = expected(east=0.0, cross=0.0, north=0.0)
+        return drift(point, None, flow, point.t + hours * HOUR).minor
+
+    def test_at_first_the_current_is_unsure_by_15_cm_s(self):
+        assert self.minor((0.0, 0.0)) == pytest.approx(2.4477 * 0.15 * HOUR, rel=0.02)
+
+    def test_a_current_that_is_not_known_by_twice_as_much(self):
+        assert self.minor(None) == pytest.approx(2 * self.minor((0.0, 0.0)))
+
+
+class Unseen(Sea):
+    """A glider none of whose dives are judged."""
+
+    lost: tuple[Unjudged, ...] = ()
+    apart = 6 * HOUR
+
+    def expected(self, until: float) -> Expected | None:
+        return Expected(T0, T0 + self.apart, 60.0, None, None, 0.0, 0.0, 0.0, "")
+
+    def judged(self, until: float) -> float | None:
+        return None
+
+    def unjudged(self, since: float) -> tuple[Unjudged, ...]:
+        return self.lost
+
+
+class TestUnknown:
+    def blind(self, spans, interval: float, attention: Attention) -> bool:
+        """Whether it is said that these times (h) cannot be judged."""
+        sea = Unseen()
+        sea.apart = interval
+        sea.lost = tuple(
+            Unjudged(T0 + a * HOUR, T0 + b * HOUR, Unusable.NO_HEADING, "no heading") for a, b in spans
+        )
+        end = T0 + spans[-1][1] * HOUR
+        sea.files = [Sign(end - HOUR, end, end)]
+        return blindness(sea, attention, end) is not None
+
+    @pytest.mark.parametrize("hours, said", [(19.0, False), (21.0, True)])
+    def test_two_intervals_between_surfacings_are_waited(self, hours, said):
+        """Ten hours each: the fix that ends a dive comes with the file after it."""
+        attention = Attention(unknown_hours=6.0, unknown_dives=None)
+        assert self.blind([(0.0, hours)], 10 * HOUR, attention) == said
+
+    @pytest.mark.parametrize("pause, said", [(22.0, True), (26.0, False)])
+    def test_a_day_without_anything_separates_deployments(self, pause, said):
+        attention = Attention(unknown_hours=None, unknown_dives=2)
+        assert self.blind([(0.0, 3.0), (3.0 + pause, 6.0 + pause)], HOUR, attention) == said
+
+    @pytest.mark.parametrize("minutes, said", [(14, False), (16, True)])
+    def test_less_than_a_quarter_of_an_hour_is_no_dive(self, minutes, said):
+        attention = Attention(unknown_hours=None, unknown_dives=1)
+        assert self.blind([(0.0, minutes / 60)], HOUR, attention) == said
