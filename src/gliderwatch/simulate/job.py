@@ -2,34 +2,50 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from gliderwatch.errors import GliderwatchError
+from gliderwatch.errors import ConfigError, GliderwatchError
+from gliderwatch.simulate.calls import CallLog, CallRates, call_logs
 from gliderwatch.simulate.delivery import FileForm, Names
-from gliderwatch.simulate.dockserver import Step, from_glider, play, steps, write_cache, write_full_rate
+from gliderwatch.simulate.dockserver import (
+    Step,
+    as_called,
+    from_glider,
+    log_steps,
+    play,
+    steps,
+    write_cache,
+    write_full_rate,
+)
 from gliderwatch.simulate.fleet import fleet
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Mission, Scenario
 from gliderwatch.simulate.scenarios import fault_line, find, load
 from gliderwatch.simulate.truth import write_truth
 
+Logs = Mapping[str, Sequence[CallLog]]
+"""The logs of the calls of each glider, in order of time."""
+
 
 @dataclass(frozen=True, slots=True)
 class Job:
     """Where to write the files of which gliders, whether compressed, and how much faster than time
-    (None: at once)."""
+    (None: at once). ``calls``: how the calls go whose logs are written (None: none are); it is the last
+    glider that aborts."""
 
     out: Path
     scenarios: Sequence[Scenario]
     compressed: bool = False
     speedup: float | None = None
+    calls: CallRates | None = None
 
     @property
     def dockserver(self) -> Path:
@@ -55,14 +71,29 @@ def gliders(
     return fleet(scenario, n)
 
 
+def call_rates(abort: str | None) -> CallRates:
+    """How calls go: as usual, now and then dropped or without a file; with an abort as in `LEAK@2`, if any.
+
+    Raises `ConfigError` for an abort that is none.
+    """
+    usual = CallRates(dropped=0.03, no_file=0.03, garbled=0.002)
+    if abort is None:
+        return usual
+    match = re.fullmatch(r"([A-Za-z_]{1,40})@(\d+(?:\.\d+)?)", abort)
+    if match is None:
+        raise ConfigError(f"--abort {abort}: give a cause and a day, as LEAK@2")
+    return replace(usual, abort=float(match[2]), cause=match[1].upper())
+
+
 def run(job: Job) -> None:
     """Do it, and say what was done. Raises `GliderwatchError` where a glider cannot fly."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     console, is_seen = Console(stderr=True), sys.stderr.isatty()
     with Progress(*columns, console=console, transient=True, disable=not is_seen) as progress:
         missions = _fly(job, progress)
-        table, facts = write_truth(job.out, missions)
-        count = _write(job, missions, progress)
+        logs = _logs(job, missions)
+        table, facts = write_truth(job.out, missions, logs)
+        count = _write(job, missions, logs, progress)
     print(f"{count} files of {len(missions)} gliders below {job.dockserver}")
     print(f"what is true of them: {table}, {facts}")
 
@@ -78,13 +109,26 @@ def _fly(job: Job, progress: Progress) -> list[Mission]:
     return missions
 
 
-def _write(job: Job, missions: Sequence[Mission], progress: Progress) -> int:
+def _logs(job: Job, missions: Sequence[Mission]) -> Logs:
+    """The logs of the calls of each glider; none where none are wanted."""
+    if job.calls is None:
+        return {}
+    logs = {}
+    for mission in missions:
+        rates = job.calls if mission is missions[-1] else replace(job.calls, abort=None)
+        logs[mission.scenario.glider] = tuple(call_logs(mission, rates, _form(job, mission, Names.AS_SENT)))
+    return logs
+
+
+def _write(job: Job, missions: Sequence[Mission], logs: Logs, progress: Progress) -> int:
     """Write the files as they come, and those read out after the recovery; how many there are."""
     acts: list[Step] = []
     for mission in missions:
         write_cache(job.out / "cache", mission)
         from_glider(job.dockserver, mission).mkdir(parents=True, exist_ok=True)
-        acts += steps(job.dockserver, mission, _form(job, mission, Names.AS_SENT))
+        called = logs.get(mission.scenario.glider, ())
+        acts += as_called(steps(job.dockserver, mission, _form(job, mission, Names.AS_SENT)), called)
+        acts += log_steps(job.dockserver, mission, called)
     acts.sort(key=lambda step: step.time)
     count = sum(step.ends for step in acts)
     task = progress.add_task("sending", total=count)

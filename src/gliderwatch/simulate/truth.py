@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from gliderwatch.simulate.calls import CallLog
 from gliderwatch.simulate.delivery import make_calls
 from gliderwatch.simulate.faults import FaultKind
 from gliderwatch.simulate.scenario import DiveTruth, Mission
@@ -63,14 +65,26 @@ def _reported(dive: DiveTruth) -> tuple[float, float]:
     return dive.reported if dive.reported is not None else (np.nan, np.nan)
 
 
-def write_truth(folder: Path, missions: Sequence[Mission]) -> tuple[Path, Path]:
-    """Write `truth.nc`, one row a dive, and `truth.json`, the faults and artefacts; their paths."""
+def write_truth(
+    folder: Path, missions: Sequence[Mission], logs: Mapping[str, Sequence[CallLog]] = MappingProxyType({})
+) -> tuple[Path, Path]:
+    """Write `truth.nc`, one row a dive, and `truth.json`, the faults, artefacts and calls; their paths.
+
+    ``logs`` are those of the calls of each glider, where they are written.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     table, facts = folder / "truth.nc", folder / "truth.json"
     _write_table(table, missions)
-    text = json.dumps({"gliders": [_facts(mission) for mission in missions]}, indent=1)
+    gliders = [_facts(mission) | _calls(logs.get(mission.scenario.glider, ())) for mission in missions]
+    text = json.dumps({"gliders": gliders}, indent=1)
     facts.write_text(text + "\n", encoding="utf-8")
     return table, facts
+
+
+def _calls(logs: Sequence[CallLog]) -> dict[str, Any]:
+    """What became of each call."""
+    calls = [{"log": log.name, "begun_seconds": log.begun, "fate": str(log.fate)} for log in logs]
+    return {"calls": calls} if calls else {}
 
 
 def _write_table(path: Path, missions: Sequence[Mission]) -> None:
