@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum, StrEnum
 from operator import attrgetter
@@ -12,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from gliderwatch.model import Array
+from gliderwatch.simulate.calls import CallLog
 from gliderwatch.simulate.dinkum import Generation, compress, encode
 from gliderwatch.simulate.scenario import Mission
 from gliderwatch.simulate.telemetry import SegmentData
@@ -198,9 +200,11 @@ __all__ = [
     "Names",
     "Step",
     "arrivals",
+    "as_called",
     "cache",
     "deliver",
     "from_glider",
+    "log_steps",
     "play",
     "steps",
     "write_cache",
@@ -318,6 +322,25 @@ def steps(root: Path, mission: Mission, form: FileForm = USUAL) -> Iterator[Step
             yield Step(t, act, path, chunk, mtime=mtime)
         if arrival.renamed:
             yield Step(arrival.renamed_at, Act.RENAME, path, target=folder / arrival.renamed)
+
+
+def as_called(order: Iterable[Step], logs: Sequence[CallLog]) -> Iterator[Step]:
+    """The steps but for those of calls in which no file is sent: what was to come then never comes."""
+    times = [log.begun for log in logs]
+    for step in order:
+        k = bisect_right(times, step.time) - 1
+        if k < 0 or logs[k].sends:
+            yield step
+
+
+def log_steps(root: Path, mission: Mission, logs: Iterable[CallLog]) -> Iterator[Step]:
+    """How the logs of the calls of one glider grow, line by line, in no order across files."""
+    folder = from_glider(root, mission).with_name("logs")
+    for log in logs:
+        last = len(log.lines) - 1
+        for k, (t, line) in enumerate(log.lines):
+            act, mtime = Act.APPEND if k else Act.BEGIN, t if k == last else None
+            yield Step(t, act, folder / log.name, line, mtime=mtime)
 
 
 def play(order: Iterable[Step], wait: Callable[[float], None] = lambda t: None) -> Iterator[Step]:
