@@ -1,4 +1,4 @@
-"""The main job in a minute: gliders surface, a remora takes hold of one, the pilot's mail arrives.
+"""The main job in a minute: gliders surface, a remora takes hold of one, another aborts; the mails arrive.
 
 Everything is real but the sea: the files are genuine Dinkum files, the daemon is the installed command,
 the mail goes through an SMTP server on this machine. Run by `make demo`; leaves nothing behind.
@@ -24,11 +24,18 @@ from rich.console import Console
 from rich.panel import Panel
 from rich.text import Text
 
-HURT, WELL = "sim-01", "sim-02"
+from gliderwatch.simulate.calls import CallRates, Fate, call_logs
+from gliderwatch.simulate.glider import simulate
+from gliderwatch.simulate.scenario import Scenario
+
+HURT, WELL, ABORTING = "sim-01", "sim-02", "sim-03"
 SPEEDUP = 12000
 """Three days of the gliders' lives in about twenty seconds."""
 FLEET = ("--gliders", "2", "--days", "3", "--fault", "remora:8@2", "--seed", "4")
 PATIENCE = 30.0
+DAY = 86400.0
+LINE = 0.05
+"""Seconds from line to line of a log."""
 GLIDERWATCH = Path(sys.executable).with_name("gliderwatch")
 
 CONFIGURATION = """\
@@ -38,7 +45,7 @@ dockserver:
 state: {{path: {folder}/state.sqlite}}
 defaults:
   normal_speed: {{min: 0.20, max: 0.40}}
-gliders: {{sim-01: , sim-02: }}
+gliders: {{sim-01: , sim-02: , sim-03: }}
 channels:
   mail: {{url: "mailto://127.0.0.1:{port}?from=gliderwatch@dockserver.local&to=pilot@ship.local"}}
 recipients:
@@ -52,6 +59,10 @@ class Mailbox:
     def __init__(self, console: Console) -> None:
         self.mails: list[Message] = []
         self._console = console
+
+    def gliders(self) -> set[str]:
+        """The gliders that mails are about."""
+        return {name for name in (HURT, WELL, ABORTING) if any(name in m["Subject"] for m in self.mails)}
 
     async def handle_DATA(  # noqa: N802 (aiosmtpd wants this name)
         self, _server: Any, _session: Any, envelope: Any
@@ -98,6 +109,20 @@ def play(dockserver: Path, console: Console) -> None:
         sys.exit("the simulation failed: try it with `gliderwatch simulate`")
 
 
+def call(dockserver: Path, console: Console) -> None:
+    """Let a third glider abort: the log of its call grows, as that of a call that is on now."""
+    scenario = Scenario(glider=ABORTING, seed=4, days=1.0, start=time.time() - DAY)
+    logs = call_logs(simulate(scenario), CallRates(abort=0.5))
+    log = next(log for log in logs if log.fate is Fate.ABORT)
+    path = dockserver / "gliders" / ABORTING / "logs" / log.name
+    path.parent.mkdir(parents=True)
+    console.print(f"{ABORTING} calls: {path.name} grows", highlight=False)
+    for _, line in log.lines:
+        with path.open("ab") as file:
+            file.write(line)
+        time.sleep(LINE)
+
+
 def onset(dockserver: Path) -> float:
     """When the remora comes (s), as the truth beside the files tells."""
     truth = json.loads((dockserver / "truth.json").read_text(encoding="utf-8"))
@@ -134,7 +159,7 @@ def main() -> int:
         config.write_text(CONFIGURATION.format(folder=folder, port=port))
         for part in ("gliders", "cache"):
             (folder / "dockserver" / part).mkdir(parents=True)
-        console.rule("a dockserver, two gliders, one daemon")
+        console.rule("a dockserver, three gliders, one daemon")
         if gliderwatch("check", "-c", config):
             return 1
         with (folder / "daemon.log").open("wb") as log:
@@ -145,8 +170,9 @@ def main() -> int:
         try:
             wait_for_status(config)
             play(folder / "dockserver", console)
+            call(folder / "dockserver", console)
             deadline = time.monotonic() + PATIENCE
-            while not mailbox.mails and time.monotonic() < deadline:
+            while {HURT, ABORTING} - mailbox.gliders() and time.monotonic() < deadline:
                 time.sleep(0.1)
             console.rule("gliderwatch status")
             gliderwatch("status", "-c", config)
@@ -156,8 +182,12 @@ def main() -> int:
             server.stop()
     arrived = [m["Subject"] for m in mailbox.mails if HURT in m["Subject"]]
     false = [m["Subject"] for m in mailbox.mails if WELL in m["Subject"]]
-    console.rule(f"mails about {HURT}: {len(arrived)}; about {WELL}, which is well: {len(false)}")
-    return 0 if arrived and not false else 1
+    aborted = [m["Subject"] for m in mailbox.mails if m["Subject"] == f"{ABORTING} ABORTED: leak"]
+    console.rule(
+        f"mails about {HURT}: {len(arrived)}; about {WELL}, which is well: {len(false)}; "
+        f"about the abort of {ABORTING}: {len(aborted)}"
+    )
+    return 0 if arrived and not false and len(aborted) == 1 else 1
 
 
 if __name__ == "__main__":

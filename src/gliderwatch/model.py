@@ -99,6 +99,71 @@ class Hindrance(StrEnum):
     NOT_ASSESSED = "not_assessed"
 
 
+# --------------------------------------------------------------------------- calls
+
+
+class Happening(StrEnum):
+    """What a glider told in a dialog that a pilot has to know."""
+
+    ABORTING = "aborting"
+    FELL_OUT = "fell_out"
+    LAST_MISSION = "last_mission"
+    GLIDER_DOS = "glider_dos"
+    EMERGENCY = "emergency"
+    WEIGHT_DROPPED = "weight_dropped"
+
+
+@dataclass(frozen=True, slots=True)
+class Happened:
+    """A happening at time ``t`` (s): ``cause`` is the abort, mission or prompt named; ``by_pilot`` whether a
+    pilot had stopped the mission from the keyboard before, in the same call."""
+
+    what: Happening
+    t: float
+    cause: str = ""
+    by_pilot: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Aborts:
+    """The abort history that a glider prints at every call until it is reset: how many since the reset, and
+    cause and time (s) of the last. ``at``: when it was printed first (s)."""
+
+    count: int
+    at: float
+    cause: str = ""
+    t: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """One connection of a glider, as far as its log tells.
+
+    ``began`` and ``last_t`` are the first and the last time it printed (s, its clock), ``over`` whether the
+    end of the connection is in the log, ``calls_back`` whether it said that it would. ``fix`` is the last
+    position, ``waypoint`` (latitude, longitude, degrees) where it is bound; ``reason`` why it is up.
+    ``announced`` are the names of files whose transfer began, ``sent`` of those whose transfer was done;
+    ``mission`` and ``segment`` what it named last as running, at ``mission_t`` (s).
+    """
+
+    glider: str
+    log: str
+    began: float
+    last_t: float
+    over: bool = False
+    calls_back: bool = False
+    fix: Fix | None = None
+    waypoint: tuple[float, float] | None = None
+    reason: str = ""
+    mission: str = ""
+    mission_t: float | None = None
+    segment: str = ""
+    announced: tuple[str, ...] = ()
+    sent: tuple[str, ...] = ()
+    aborts: tuple[Aborts, ...] = ()
+    happened: tuple[Happened, ...] = ()
+
+
 # --------------------------------------------------------------------------- navigation
 
 
@@ -300,6 +365,8 @@ class Kind(StrEnum):
     OVERDUE = "overdue"
     UNKNOWN = "unknown"
     SURFACING = "surfacing"
+    ABORT = "abort"
+    CALL = "call"
     OPERATOR = "operator"
 
 

@@ -274,7 +274,7 @@ class TestRefused:
         store._db.execute("UPDATE outbox SET error = 'refused: not yet' WHERE alert = 'waits'")
         store._db.executescript(
             "ALTER TABLE outbox DROP COLUMN delivery; ALTER TABLE files DROP COLUMN hindrance;"
-            "DROP INDEX files_by_segment;"
+            "DROP INDEX files_by_segment; DROP TABLE calls;"
             "PRAGMA user_version = 4;"
         )
         assert [u.alert for u in store.refused(0.0)] == ["1", "2", "4"]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gliderwatch.incidents.send_schedule import Wait
-from gliderwatch.model import Alert, Segment, SegmentId, Severity
+from gliderwatch.model import Alert, Call, Kind, Segment, SegmentId, Severity
 from gliderwatch.params import Attention, GliderParams
 from gliderwatch.service import transaction
 from gliderwatch.service.daemon import HOLD, TICK, OverdueTimer
@@ -18,6 +18,7 @@ from gliderwatch.service.routing import Routing
 from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
+from gliderwatch.slocum.calls import Dialog
 from gliderwatch.slocum.decode import decode
 from gliderwatch.slocum.header import read_header
 from gliderwatch.store.state_file import File, Status, Store
@@ -367,3 +368,27 @@ class TestQuiet:
     def test_off_for_a_month(self, fleet) -> None:
         live, _, due = silent(fleet)
         assert live.tick(due + 31 * DAY) == []
+
+
+def test_a_glider_that_calls_and_sends_no_file_is_not_overdue(
+    fleet: tuple[Path, list[tuple[Path, Segment]]],
+) -> None:
+    def silence(*, calls: bool) -> set[str]:
+        live, said = Live(), set[str]()
+        for _, segment in fleet[1]:
+            if segment.id.glider == "angus" and segment.last_t <= START + DAY:
+                said |= set(live.take(segment))
+        for k in range(1, 13):
+            t = live.now + 6 * HOUR
+            said |= set(live.until(t))
+            if calls:
+                call = Call("angus", f"{k}.log", t, t + 200, over=True, mission="a.mi", mission_t=t)
+                file = File(f"/{k}.log", 1, 1, Status.TAKEN, "angus")
+                dialog = Dialog(call)
+                taken = transaction.take_log(live.store, file, dialog, GliderParams(), live.speaking, t + 200)
+                said |= {str(a.kind) for a in taken.alerts}
+            live.now = t + 200
+        return said
+
+    assert Kind.OVERDUE in silence(calls=False)
+    assert silence(calls=True) == {Kind.CALL}

@@ -24,6 +24,12 @@ from gliderwatch.errors import GliderwatchError
 @click.option("--seed", type=click.IntRange(0), help="Chance of its own for each seed.")
 @click.option("--compressed", is_flag=True, help="Write scd and tcd files.")
 @click.option("--full-rate", is_flag=True, help="Write dbd and ebd files too, into OUT/recovered.")
+@click.option("--logs", is_flag=True, help="Write the logs of calls too.")
+@click.option(
+    "--abort",
+    metavar="CAUSE@DAY",
+    help="With --logs: the last glider aborts by then, as LEAK@2, and waits at its prompt.",
+)
 @click.option("--live", is_flag=True, help="Let the files come as time passes; OUT may be in use.")
 @click.option("--speedup", type=click.FloatRange(0, min_open=True), help="With --live: how much faster (1).")
 def simulate(
@@ -35,6 +41,8 @@ def simulate(
     seed: int | None,
     compressed: bool,
     full_rate: bool,
+    logs: bool,
+    abort: str | None,
     live: bool,
     speedup: float | None,
 ) -> None:
@@ -44,9 +52,12 @@ def simulate(
     """
     from gliderwatch.simulate import job
 
+    if abort is not None and not logs:
+        raise click.UsageError("--abort goes with --logs")
     if speedup is not None and not live:
         raise click.UsageError("--speedup goes with --live")
     if not live and out.is_dir() and any(out.iterdir()):
         raise GliderwatchError(f"{out} is not empty: give another folder, or remove it")
     scenarios = job.gliders(name, gliders, days, seed, faults, full_rate)
-    job.run(job.Job(out, scenarios, compressed, (speedup or 1.0) if live else None))
+    rates = job.call_rates(abort) if logs else None
+    job.run(job.Job(out, scenarios, compressed, (speedup or 1.0) if live else None, rates))

@@ -249,6 +249,9 @@ class Dockserver(Section):
     rescan_seconds: Annotated[Number, Field(ge=1, le=86400)] = Field(
         default=300.0, description="Time between scans for files that the observer missed (s)."
     )
+    logs: bool = Field(
+        default=True, description="Read the logs of calls too, where a folder `logs` is beside `from-glider`."
+    )
     observer: Literal["inotify", "polling"] = Field(
         default="inotify", description="`polling` for folders on NFS or SMB, where inotify sees nothing."
     )

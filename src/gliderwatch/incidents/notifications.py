@@ -9,7 +9,9 @@ from math import ceil
 from types import MappingProxyType
 from typing import Protocol
 
+from gliderwatch.incidents.aborts import Episode
 from gliderwatch.incidents.acknowledgement import Acks
+from gliderwatch.incidents.calls import Empty
 from gliderwatch.incidents.constants import FLOW_CHANGE, MARKS, NEWS, SLACK, SPEED_CHANGE, WEEK
 from gliderwatch.incidents.overdue import Silence
 from gliderwatch.incidents.unjudged import Unknown
@@ -43,15 +45,18 @@ class Thread:
 class NotificationState:
     """What people have been told of one glider.
 
-    ``surfaced`` is the surfacing of the last notice (s), ``silences`` what was told of its staying away
-    (`incidents.overdue`), ``unknown`` of dives that could not be judged (`incidents.unjudged`),
-    ``irregularities`` the ids of those of its files.
+        ``surfaced`` is the surfacing of the last notice (s), ``silences`` what was sent of its staying away
+    (`incidents.overdue`), ``unknown`` of dives that could not be judged (`incidents.unjudged`), ``aborts`` of
+    aborts (`incidents.aborts`), ``empty`` of calls without a file (`incidents.calls`), ``irregularities`` the
+    ids of those of its files.
     """
 
     threads: tuple[Thread, ...] = ()
     surfaced: float | None = None
     silences: tuple[Silence, ...] = ()
     unknown: Unknown | None = None
+    aborts: tuple[Episode, ...] = ()
+    empty: Empty | None = None
     irregularities: tuple[str, ...] = ()
 
 
@@ -117,8 +122,8 @@ def due_notifications(
 
 
 def unacknowledged(said: NotificationState, incidents: tuple[Incident, ...], acks: Acks) -> frozenset[str]:
-    """The threads of what goes on and nobody has taken on: incidents, and gliders that stay away or cannot
-    be judged."""
+    """The threads of what goes on and nobody has taken on: incidents, and gliders that stay away, cannot be
+    judged, have aborted, or call and send nothing."""
     matched = _matched(said.threads, incidents)
     threads = {
         thread.id
@@ -129,6 +134,9 @@ def unacknowledged(said: NotificationState, incidents: tuple[Incident, ...], ack
     }
     if said.unknown is not None and not said.unknown.is_over:
         threads.add(said.unknown.id)
+    threads |= {episode.id for episode in said.aborts if episode.cleared is None}
+    if said.empty is not None and not said.empty.is_over:
+        threads.add(said.empty.id)
     return frozenset(threads | {silence.id for silence in said.silences if silence.called is None})
 
 

@@ -51,11 +51,12 @@ _K95 = sqrt(CHI2_COVERED)
 @dataclass(frozen=True, slots=True)
 class Sign:
     """A sign of life: a file ``opened_at`` (s) by the glider's clock, with its last sample ``last_t`` (None:
-    it is not read), that came ``at`` (s) by ours."""
+    it is not read), that came ``at`` (s) by ours; or the log of a call from ``opened_at`` to ``last_t``."""
 
     opened_at: float
     last_t: float | None
     at: float
+    is_call: bool = False
 
     def life(self, interval: float, watched: float) -> float:
         """When the glider was alive by this file, whatever its clock says.
@@ -70,7 +71,7 @@ class Sign:
     def time(self, interval: float) -> float:
         """When the glider sent it, at the latest: after its last sample, one `interval` after its opening
         where it breaks off or cannot be read; never after it came."""
-        end = self.opened_at + interval
+        end = self.opened_at if self.is_call else self.opened_at + interval
         return min(end if self.last_t is None else max(self.last_t, end), self.at)
 
 
@@ -109,7 +110,7 @@ def margin(expected: NextSurfacing, signs: Iterable[Sign], now: float, overdue_h
 def rhythm(signs: Iterable[Sign], now: float, longest: float = inf) -> float | None:
     """Seconds from one file that comes to the next, usually: with the stay at the surface, and with the file
     between them where every other one is lost. After ``longest`` it is a silence. None: too few known."""
-    opened = sorted(s.opened_at for s in signs if s.opened_at <= now)[-FILES_KEPT:]
+    opened = sorted(s.opened_at for s in signs if s.opened_at <= now and not s.is_call)[-FILES_KEPT:]
     gaps = [b - a for a, b in pairwise(opened) if SHORTEST_INTERVAL < b - a < longest]
     return median_low(gaps) if len(gaps) > 1 else None
 

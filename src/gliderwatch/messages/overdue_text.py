@@ -1,7 +1,7 @@
 """What people read when a glider stays away, and when it calls again. Pure.
 
-The same form as `messages.incident_text`: what and how bad, since when, where to look, what speaks for trouble
-and against it, what to check.
+The same form as `messages.incident_text`: what and how bad, since when, where to look, what speaks
+for trouble and against it, what to check.
 """
 
 from __future__ import annotations

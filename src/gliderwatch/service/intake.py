@@ -54,6 +54,9 @@ class Intake:
 
         Of a science file it is the flight file beside it that is looked at, anew, if it lacks the depth.
         """
+        if folders.is_log(path.name):
+            self._take_log(path)
+            return
         if not folders.is_science(path.name):
             self._judge(path)
             return
@@ -179,6 +182,20 @@ class Intake:
             self._note(triage.failed(file, error))
         else:
             self._told(taken, time.monotonic() - begun)
+
+    def _take_log(self, path: Path) -> None:
+        """Read on in the log of a call."""
+        found = triage.judge_log(path, self._store, self._is_known)
+        if found is None:
+            return
+        file, dialog = found
+        params, speaking = self._parts.config.glider(file.glider), self._speaking(file.glider)
+        before = self._store.file(file.path)
+        taken = transaction.take_log(self._store, file, dialog, params, speaking, time.time())
+        if before is None or before.status != file.status:  # not once for each line that comes
+            self._told(taken)
+        else:
+            self.alerted(taken.alerts)
 
     def _gave_no_more(self, file: File, segment: Segment) -> bool:
         """Whether a file that was looked at anew, for what lies beside it, gave no more than before."""

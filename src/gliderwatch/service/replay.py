@@ -23,6 +23,7 @@ from gliderwatch.service import transaction, triage
 from gliderwatch.service.jsonl import alert_line, assessment_line, write_lines
 from gliderwatch.service.liveness import alive_path
 from gliderwatch.service.ocean_cache import OceanCache
+from gliderwatch.service.replay_logs import Log, find_logs, read_logs
 from gliderwatch.service.routing import NOBODY, Routing, routing_of
 from gliderwatch.service.triage import Job
 from gliderwatch.slocum.decode import Decoder
@@ -130,23 +131,29 @@ def replay(
 ) -> Report:
     """Replay the files of some folders in the order of time. Raises GliderwatchError where there are none."""
     files = find_files(request.folders)
-    if not files:
+    has_logs = request.config is None or request.config.dockserver.logs
+    logs = find_logs(request.folders) if has_logs else []
+    if not files and not logs:
         where = ", ".join(map(str, request.folders))
-        raise GliderwatchError(f"no flight data files (sbd, scd, mbd, mcd, dbd, dcd) below {where}")
-    on_total(len(files))
+        raise GliderwatchError(f"no flight data files (sbd, scd, mbd, mcd, dbd, dcd) or logs below {where}")
+    on_total(len(files) + len(logs))
     with _state(request) as path, tempfile.TemporaryDirectory(prefix="gliderwatch-") as kept:
         lists = SensorLists(Path(kept))
         ocean = None if request.config is None else OceanCache(request.config)
         report = Report(Store.open(path, durable=False), ocean)
         with _speaking(request, path, report) as told:
             jobs = _triage(files, report, lists, request, on_file)
-            _check_glider(request, jobs, report.store)
-            for job in jobs:
-                report.coming.setdefault(job.header.id.glider, deque()).append(job.header.id.opened_at)
+            calls = deque(read_logs(logs, report.store, request.is_wanted))
+            _check_glider(request, jobs, calls, report.store)
+            report.coming = _coming(jobs, calls)
             turns = ReplayOrder(jobs)
             for decoded in _decoded(jobs, [*cache_folders(request), lists.folder], workers):
                 for job, sent in turns.after(decoded):
+                    while calls and calls[0].sent <= sent:
+                        _take_log(calls.popleft(), report, request, told, on_file)
                     _take(job, sent, report, request, told, on_file)
+            for call in calls:
+                _take_log(call, report, request, told, on_file)
         if request.out is not None:
             _write(request.out, report.store)
     return report
@@ -308,10 +315,10 @@ def _note(
     _count(transaction.record_file(report.store, file, GliderParams(), None, time.time()), report, on_file)
 
 
-def _check_glider(request: Request, jobs: Sequence[Job], store: Store) -> None:
+def _check_glider(request: Request, jobs: Sequence[Job], calls: Iterable[Log], store: Store) -> None:
     """Raises GliderwatchError where the glider asked for has no files, but others have."""
     others = sorted({file.glider for file in store.files(Status.UNKNOWN)})
-    asked = {job.header.id.glider for job in jobs}
+    asked = {job.header.id.glider for job in jobs} | {call.file.glider for call in calls}
     if request.glider is not None and others and request.glider not in asked:
         raise GliderwatchError(f"no files of glider {request.glider}, but of: {', '.join(others)}")
 
@@ -346,6 +353,34 @@ def _take(
     report.coming[glider].popleft()
     report.clock[glider] = max(sent, report.clock.get(glider, sent))
     _count(replace(taken, alerts=(*ticked, *taken.alerts)), report, on_file)
+
+
+def _take_log(
+    log: Log,
+    report: Report,
+    request: Request,
+    told: Routing,
+    on_file: Callable[[transaction.FileOutcome], None],
+) -> None:
+    """Let the clock run until a call was over, and take its log."""
+    glider, is_taken = log.file.glider, log.file.status is Status.TAKEN
+    ticked = _tick(report, told, log.sent) if is_taken else []
+    taken = transaction.take_log(report.store, log.file, log.dialog, request.params(glider), told, log.sent)
+    if is_taken:
+        report.coming[glider].popleft()
+        report.clock[glider] = max(log.sent, report.clock.get(glider, log.sent))
+    _count(replace(taken, alerts=(*ticked, *taken.alerts)), report, on_file)
+
+
+def _coming(jobs: Iterable[Job], calls: Iterable[Log]) -> dict[str, deque[float]]:
+    """When the files of each glider were opened and its calls were over, in order of time (s)."""
+    coming: dict[str, list[float]] = {}
+    for job in jobs:
+        coming.setdefault(job.header.id.glider, []).append(job.opened_at)
+    for log in calls:
+        if log.file.status is Status.TAKEN:
+            coming.setdefault(log.file.glider, []).append(log.sent)
+    return {glider: deque(sorted(times)) for glider, times in coming.items()}
 
 
 def _tick(report: Report, told: Routing, until: float) -> list[Alert]:

@@ -114,6 +114,7 @@ def build(
         config.dockserver.cache,
         news,
         config.dockserver.observer,
+        logs=config.dockserver.logs,
     )
     ocean, speaks = OceanCache(config), routing_of(config)
     lists = SensorLists(lists_folder(Path(config.state.path)))

@@ -6,9 +6,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from gliderwatch.errors import GliderwatchError, NotAssessed
-from gliderwatch.incidents import irregularities, overdue, unjudged
+from gliderwatch.incidents import aborts, irregularities, overdue, unjudged
+from gliderwatch.incidents import calls as without_files
 from gliderwatch.incidents.acknowledgement import with_mute
-from gliderwatch.incidents.notifications import due_notifications
+from gliderwatch.incidents.constants import GONE
+from gliderwatch.incidents.notifications import NotificationState, due_notifications
 from gliderwatch.incidents.send_schedule import AT_ONCE, Wait
 from gliderwatch.messages.overdue_text import Fleet
 from gliderwatch.model import Alert, Assessment, Segment, SegmentId
@@ -16,7 +18,9 @@ from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
 from gliderwatch.sea.ocean_field import Field
 from gliderwatch.service.routing import Routing, post_alerts, withdraw_answered
-from gliderwatch.store.state_file import File, Status, Store
+from gliderwatch.slocum.calls import Dialog
+from gliderwatch.store.codec import plain_encode
+from gliderwatch.store.state_file import File, GliderFacts, Status, Store
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +81,28 @@ def record_file(
         if file.opened_at is not None and file.status != Status.UNKNOWN:
             store.hear(SegmentId(file.opened_at, file.glider, file.segment), None, now)
         alerts = _due_messages(store, file.glider, params, speaking, now) if file.glider else ()
+    return FileOutcome(file, alerts=alerts)
+
+
+def take_log(
+    store: Store,
+    file: File,
+    dialog: Dialog | None,
+    params: GliderParams,
+    speaking: Routing | None,
+    now: float,
+) -> FileOutcome:
+    """Keep what the log of a call tells by `now` (s), and say what is to be said.
+
+    `dialog` is None where the log could not be read.
+    """
+    with store.transaction():
+        store.note(file, now)
+        if dialog is not None:
+            store.calls.keep(file.path, dialog.call, plain_encode(dialog), now)
+        alerts = (
+            _due_messages(store, file.glider, params, speaking, now) if file.status is Status.TAKEN else ()
+        )
     return FileOutcome(file, alerts=alerts)
 
 
@@ -190,6 +216,16 @@ def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: 
         raise NotAssessed(f"cannot be assessed, please report it ({segment.id.name}: {what})") from error
 
 
+def _speak_of_calls(
+    said: NotificationState, known: GliderFacts, now: float
+) -> tuple[NotificationState, list[Alert]]:
+    """What is to be said of what a glider told in its calls."""
+    calls = known.calls(now - GONE)
+    episodes, alerts = aborts.announce(known.glider, said.aborts, calls, now)
+    empty, more = without_files.announce(known.glider, said.empty, calls, known.signs(now - GONE), now)
+    return replace(said, aborts=episodes, empty=empty), [*alerts, *more]
+
+
 def _due_messages(
     store: Store, glider: str, params: GliderParams, speaking: Routing | None, now: float
 ) -> tuple[Alert, ...]:
@@ -212,6 +248,8 @@ def _due_messages(
     ids, notices = irregularities.due(before.irregularities, known.irregularities(now), now)
     said = replace(said, unknown=blind, irregularities=ids)
     alerts = [*heard, *notices, *alerts, *more]
+    said, more = _speak_of_calls(said, known, now)
+    alerts += more
     if said != before or alerts:
         post_alerts(store, glider, said, alerts, _channels(store, before.silences, speaking), now)
     return tuple(alerts)

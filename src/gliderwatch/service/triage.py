@@ -13,9 +13,11 @@ from pathlib import Path
 from gliderwatch.errors import MissingCache, NotAssessed, Quarantine, Retry
 from gliderwatch.model import Hindrance, Segment
 from gliderwatch.slocum.caches import is_there
+from gliderwatch.slocum.calls import Dialog, read_log
 from gliderwatch.slocum.folders import Settling
 from gliderwatch.slocum.header import Header, read_header
 from gliderwatch.slocum.science import needs_science, science_files
+from gliderwatch.store.codec import plain_decode
 from gliderwatch.store.state_file import File, Status, Store
 
 # ----------------------------------------
@@ -202,6 +204,36 @@ def triage(
     if header.factored and _is_missing(header.crc, caches):
         return failed(file, MissingCache(header.crc, caches))
     return Job(file, header)
+
+
+def judge_log(path: Path, store: Store, is_known: Callable[[str], bool]) -> tuple[File, Dialog | None] | None:
+    """The row of a log for the ledger, and what it tells by now if it could be read; None: nothing is new."""
+    now, name = state(path), _text(path)
+    before = store.file(name)
+    if now is None:
+        if before is not None and before.status not in DONE:
+            return replace(before, status=Status.DUPLICATE, reason="is gone"), None
+        return None
+    was_unknown = before is not None and before.status == Status.UNKNOWN and is_known(before.glider)
+    if before is not None and (before.size, before.mtime_ns) == now and not was_unknown:
+        return None
+    file, kept = File(name, *now, Status.TAKEN), store.calls.dialog(name)
+    try:
+        dialog = read_log(_plain(path), None if kept is None else plain_decode(kept, Dialog))
+    except (Quarantine, Retry) as error:
+        return failed(file, error), None
+    return _of_glider(file, dialog.call.glider, is_known), dialog
+
+
+def _of_glider(file: File, glider: str, is_known: Callable[[str], bool]) -> File:
+    """The row of a log that was read, of the glider that it names."""
+    if not glider:
+        reason = "is a log in which no line `Vehicle Name:` says yet of which glider"
+        return replace(file, status=Status.WAITING, reason=reason)
+    if not is_known(glider):
+        reason = f"glider {glider} is not in the configuration"
+        return replace(file, status=Status.UNKNOWN, glider=glider, reason=reason)
+    return replace(file, glider=glider)
 
 
 def _is_settled(before: File, caches: Sequence[Path], is_known: Callable[[str], bool]) -> bool:

@@ -4,19 +4,22 @@ beside them."""
 from __future__ import annotations
 
 import json
+import re
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from gliderwatch.errors import GliderwatchError
+from gliderwatch.errors import ConfigError, GliderwatchError
+from gliderwatch.simulate.calls import CallLog, CallRates, as_called, call_logs, log_steps
 from gliderwatch.simulate.delivery import (
     FileForm,
     Names,
@@ -84,14 +87,26 @@ def _reported(dive: DiveTruth) -> tuple[float, float]:
     return dive.reported if dive.reported is not None else (np.nan, np.nan)
 
 
-def write_truth(folder: Path, missions: Sequence[Mission]) -> tuple[Path, Path]:
-    """Write `truth.nc`, one row a dive, and `truth.json`, the faults and artefacts; their paths."""
+def write_truth(
+    folder: Path, missions: Sequence[Mission], logs: Mapping[str, Sequence[CallLog]] = MappingProxyType({})
+) -> tuple[Path, Path]:
+    """Write `truth.nc`, one row a dive, and `truth.json`, the faults, artefacts and calls; their paths.
+
+    ``logs`` are those of the calls of each glider, where they are written.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     table, facts = folder / "truth.nc", folder / "truth.json"
     _write_table(table, missions)
-    text = json.dumps({"gliders": [_facts(mission) for mission in missions]}, indent=1)
+    gliders = [_facts(mission) | _calls(logs.get(mission.scenario.glider, ())) for mission in missions]
+    text = json.dumps({"gliders": gliders}, indent=1)
     facts.write_text(text + "\n", encoding="utf-8")
     return table, facts
+
+
+def _calls(logs: Sequence[CallLog]) -> dict[str, Any]:
+    """What became of each call."""
+    calls = [{"log": log.name, "begun_seconds": log.begun, "fate": str(log.fate)} for log in logs]
+    return {"calls": calls} if calls else {}
 
 
 def _write_table(path: Path, missions: Sequence[Mission]) -> None:
@@ -200,16 +215,21 @@ def _iso(t: float) -> str:
 # ----------------------------------------
 # What `gliderwatch simulate` does: flies a fleet and writes its files, at once or as time passes.
 
+Logs = Mapping[str, Sequence[CallLog]]
+"""The logs of the calls of each glider, in order of time."""
+
 
 @dataclass(frozen=True, slots=True)
 class Job:
     """Where to write the files of which gliders, whether compressed, and how much faster than time
-    (None: at once)."""
+    (None: at once). ``calls``: how the calls go whose logs are written (None: none are); it is the last
+    glider that aborts."""
 
     out: Path
     scenarios: Sequence[Scenario]
     compressed: bool = False
     speedup: float | None = None
+    calls: CallRates | None = None
 
     @property
     def dockserver(self) -> Path:
@@ -235,14 +255,29 @@ def gliders(
     return fleet(scenario, n)
 
 
+def call_rates(abort: str | None) -> CallRates:
+    """How calls go: as usual, now and then dropped or without a file; with an abort as in `LEAK@2`, if any.
+
+    Raises `ConfigError` for an abort that is none.
+    """
+    usual = CallRates(dropped=0.03, no_file=0.03, garbled=0.002)
+    if abort is None:
+        return usual
+    match = re.fullmatch(r"([A-Za-z_]{1,40})@(\d+(?:\.\d+)?)", abort)
+    if match is None:
+        raise ConfigError(f"--abort {abort}: give a cause and a day, as LEAK@2")
+    return replace(usual, abort=float(match[2]), cause=match[1].upper())
+
+
 def run(job: Job) -> None:
     """Do it, and say what was done. Raises `GliderwatchError` where a glider cannot fly."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     console, is_seen = Console(stderr=True), sys.stderr.isatty()
     with Progress(*columns, console=console, transient=True, disable=not is_seen) as progress:
         missions = _fly(job, progress)
-        table, facts = write_truth(job.out, missions)
-        count = _write(job, missions, progress)
+        logs = _logs(job, missions)
+        table, facts = write_truth(job.out, missions, logs)
+        count = _write(job, missions, logs, progress)
     print(f"{count} files of {len(missions)} gliders below {job.dockserver}")
     print(f"what is true of them: {table}, {facts}")
 
@@ -258,13 +293,26 @@ def _fly(job: Job, progress: Progress) -> list[Mission]:
     return missions
 
 
-def _write(job: Job, missions: Sequence[Mission], progress: Progress) -> int:
+def _logs(job: Job, missions: Sequence[Mission]) -> Logs:
+    """The logs of the calls of each glider; none where none are wanted."""
+    if job.calls is None:
+        return {}
+    logs = {}
+    for mission in missions:
+        rates = job.calls if mission is missions[-1] else replace(job.calls, abort=None)
+        logs[mission.scenario.glider] = tuple(call_logs(mission, rates, _form(job, mission, Names.AS_SENT)))
+    return logs
+
+
+def _write(job: Job, missions: Sequence[Mission], logs: Logs, progress: Progress) -> int:
     """Write the files as they come, and those read out after the recovery; how many there are."""
     acts: list[Step] = []
     for mission in missions:
         write_cache(job.out / "cache", mission)
         from_glider(job.dockserver, mission).mkdir(parents=True, exist_ok=True)
-        acts += steps(job.dockserver, mission, _form(job, mission, Names.AS_SENT))
+        called = logs.get(mission.scenario.glider, ())
+        acts += as_called(steps(job.dockserver, mission, _form(job, mission, Names.AS_SENT)), called)
+        acts += log_steps(job.dockserver, mission, called)
     acts.sort(key=lambda step: step.time)
     count = sum(step.ends for step in acts)
     task = progress.add_task("sending", total=count)

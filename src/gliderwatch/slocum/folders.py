@@ -7,6 +7,7 @@ import glob
 import os
 import re
 import stat
+from calendar import timegm
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
@@ -19,6 +20,7 @@ _SCIENCE_OF = {"sbd": ("tbd", "tcd"), "mbd": ("nbd", "ncd"), "dbd": ("ebd", "ecd
 _FLIGHT_OF = {"tbd": ("sbd", "scd"), "nbd": ("mbd", "mcd"), "ebd": ("dbd", "dcd")}
 _CACHE = frozenset({"cac", "ccc"})
 _RANKS = {"sbd": 0, "mbd": 1, "dbd": 2}
+_STAMP = re.compile(r"(?<!\d)(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)(?!\d)", re.ASCII)
 _SEGMENT = re.compile(r"(?P<glider>.+)-\d{4}-\d{1,3}-\d{1,5}-\d{1,5}", re.ASCII | re.DOTALL)
 
 
@@ -100,15 +102,37 @@ def is_long(name: str) -> bool:
     return glider_of(PurePath(name).stem) is not None
 
 
+def is_log(name: str) -> bool:
+    """Whether a file of this name is the log of a call.
+
+    >>> is_log("unit_1033_20250126T072155_network_net_0.log"), is_log("notes.log")
+    (True, False)
+    """
+    return name.lower().endswith(".log") and stamp(name) is not None
+
+
+def stamp(name: str) -> float | None:
+    """The server's time (s) in the name of a log; None where there is none."""
+    match = _STAMP.search(name)
+    if match is None:
+        return None
+    year, month, day, hour, minute, second = (int(group) for group in match.groups())
+    if not (1990 <= year <= 2100 and 1 <= month <= 12 and 1 <= day <= 31 and hour < 24 and minute < 60):
+        return None
+    return float(timegm((year, month, day, hour, minute, second, 0, 0, 0)))
+
+
 # ----------------------------------------
 # Where the data of gliders lie on a dockserver, and what is there now. Nothing is ever written there.
 #
-# Files count when they lie below a folder `from-glider` of a root, as in
+# Files count when they lie below a folder `from-glider` of a root, or `logs` beside it, as in
 # `ROOT/GLIDER/from-glider` or `ROOT/GROUP/gliders/GLIDER/from-glider`, or below an explicit path of
 # a glider. Symbolic links below these are not followed; the paths themselves may be links. What has the name
 # of flight data and is no regular file (a link, a FIFO, a folder) is found too: to be named, never opened.
 
 FROM_GLIDER = "from-glider"
+LOGS = "logs"
+"""Folder beside `from-glider` with the logs of calls."""
 IGNORED = frozenset({"unknown", "archive"})
 """Folders whose files are noise, or old."""
 _DEEPEST = 6
@@ -136,7 +160,8 @@ class Place:
             return None
         if self.glider:
             return self.glider
-        return (self.path.name, *parts)[parts.index(FROM_GLIDER)] if FROM_GLIDER in parts else None
+        folder = LOGS if is_log(path.name) else FROM_GLIDER
+        return (self.path.name, *parts)[parts.index(folder)] if folder in parts else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,6 +194,8 @@ def is_folder(path: Path) -> bool:
 def find_places(roots: Sequence[str | Path], explicit: Mapping[str, Sequence[str | Path]]) -> list[Place]:
     """The places of a configuration now; explicit ones first, so that they decide for their files."""
     places = [Place(path, glider) for glider, paths in explicit.items() for path in expand(paths)]
+    beside = [Place(p.path.with_name(LOGS), p.glider) for p in places if p.path.name == FROM_GLIDER]
+    places += [place for place in beside if is_folder(place.path)]
     return places + [Place(path) for path in expand(roots)]
 
 
@@ -202,7 +229,9 @@ def _scan(
         yield from _files(entries, glider_folder)
     folders = {entry.name for entry in entries if entry.is_dir(follow_symlinks=False)}
     if FROM_GLIDER in folders and not glider_folder:
-        yield from _scan(folder / FROM_GLIDER, folder.name, depth + 1, seen, unread)
+        for name in sorted(folders & {FROM_GLIDER, LOGS}):
+            below = _scan(folder / name, folder.name, depth + 1, seen, unread)
+            yield from (found for found in below if is_log(found.path.name) == (name == LOGS))
     elif depth < _DEEPEST:
         for name in sorted(folders):
             if not is_left_out(name):
@@ -211,7 +240,7 @@ def _scan(
 
 def _files(entries: Iterable[os.DirEntry[str]], glider_folder: str) -> Iterator[Found]:
     for entry in entries:
-        if kind(entry.name) is None:
+        if kind(entry.name) is None and not is_log(entry.name):
             continue
         try:
             status = entry.stat(follow_symlinks=False)
@@ -234,8 +263,8 @@ class _Entry:
 class Settling:
     """Holds files back until they are complete, and lets each state of a file pass once.
 
-    A long name is complete at once; an 8.3 name when size and mtime have been still for
-    `settle_seconds`. What mtime says is never compared with a clock, for it is the glider's.
+    A long name is complete at once, and a log is read as it grows; an 8.3 name when size and mtime have
+    been still for `settle_seconds`. What mtime says is never compared with a clock, for it is the glider's.
     `now` is in seconds of any clock that does not jump (monotonic).
     """
 
@@ -251,7 +280,8 @@ class Settling:
         if self._passed.get(path) == state or (entry and (entry.size, entry.mtime_ns) == state):
             return
         self._passed.pop(path, None)
-        wait = 0.0 if is_long(path.name) else self.settle_seconds
+        at_once = is_long(path.name) or is_log(path.name)
+        wait = 0.0 if at_once else self.settle_seconds
         self._waiting[path] = _Entry(size, mtime_ns, now + wait)
 
     def ready(self, now: float) -> list[Path]:

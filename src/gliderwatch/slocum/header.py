@@ -10,8 +10,11 @@ import calendar
 import os
 import re
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import lz4.block  # type: ignore[import-untyped]
 
@@ -112,6 +115,21 @@ def read_regular(
     if whole and not (unchanged and len(data) == after.st_size):
         raise Retry("changed while it was read")
     return data, after
+
+
+@contextmanager
+def open_regular(path: Path) -> Iterator[BinaryIO]:
+    """A regular file, open for reading; never a link, a FIFO or a device.
+
+    Raises `Quarantine` if it is none, `Retry` if it cannot be read now, also inside.
+    """
+    try:
+        _check_regular(path.stat(follow_symlinks=False))
+        with open(path, "rb", opener=_open_itself) as file:
+            _check_regular(os.fstat(file.fileno()))
+            yield file
+    except OSError as error:
+        raise Retry(f"cannot be read: {error.strerror or error}") from error
 
 
 def _check_regular(status: os.stat_result) -> None:

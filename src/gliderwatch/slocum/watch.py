@@ -40,23 +40,30 @@ from gliderwatch.slocum.folders import (
     find_places,
     is_cache,
     is_folder,
+    is_log,
     is_science,
     kind,
     scan,
 )
 
-_BESIDE = frozenset({"to-glider", "logs", "configuration"})
+_BESIDE = frozenset({"to-glider", "configuration"})
 """Folders beside `from-glider` without data: not polled, for a share may be slow."""
 _STOP_SECONDS = 2.0
 _LIMITS = (errno.ENOSPC, errno.EMFILE)
 _CURE = "raise fs.inotify.max_user_watches and max_user_instances with sysctl, or set observer: polling,"
-_INOTIFY: list[type[FileSystemEvent]] = [FileClosedEvent, FileMovedEvent, DirCreatedEvent, DirMovedEvent]
-_POLLING: list[type[FileSystemEvent]] = [FileCreatedEvent, FileModifiedEvent, *_INOTIFY]
+_INOTIFY: list[type[FileSystemEvent]] = [
+    FileClosedEvent,
+    FileModifiedEvent,
+    FileMovedEvent,
+    DirCreatedEvent,
+    DirMovedEvent,
+]
+_POLLING: list[type[FileSystemEvent]] = [FileCreatedEvent, *_INOTIFY]
 
 
 @dataclass(frozen=True, slots=True)
 class FileChanged:
-    """A file of flight data was written, came or went; ``glider_folder`` as in `Found`."""
+    """A file of flight data or a log was written, came or went; ``glider_folder`` as in `Found`."""
 
     path: Path
     glider_folder: str
@@ -104,7 +111,8 @@ class Watcher:
     `roots`, the paths of `explicit` (by glider) and `caches` may hold glob patterns, and may not
     exist yet: `refresh`, to be called before every rescan, finds what came and went. The polling
     observer looks every `poll_seconds`. Where the system lets inotify watch no more, polling takes
-    its place until the next start, and `problems` says so. All methods are for one thread.
+    its place until the next start, and `problems` says so. With `logs` also the logs of calls are watched.
+    All methods are for one thread.
     """
 
     def __init__(
@@ -115,7 +123,9 @@ class Watcher:
         on_change: Sink,
         observer: Literal["inotify", "polling"] = "inotify",
         poll_seconds: float = 5.0,
+        logs: bool = True,
     ) -> None:
+        self._logs = logs
         self._roots, self._explicit, self._cache_patterns = roots, explicit, caches
         self._queue, self._kind, self._poll_seconds = on_change, observer, poll_seconds
         self._observer: BaseObserver | None = None
@@ -138,7 +148,8 @@ class Watcher:
     def scan(self) -> Iterator[Found]:
         """All files of flight data that are there now, each once, folder by folder."""
         self._unread = []
-        return scan(find_places(self._roots, self._explicit), self._unread)
+        found = scan(find_places(self._roots, self._explicit), self._unread)
+        return (file for file in found if self._logs or not is_log(file.path.name))
 
     def start(self) -> None:
         """Begins to watch. What cannot be watched is in `problems`; `alive` tells whether it can at all."""
@@ -244,12 +255,16 @@ class Watcher:
             return False
         return same and any(emitter.watch == watch and emitter.is_alive() for emitter in observer.emitters)
 
-    def _changed(self, path: Path, is_directory: bool) -> None:
+    def _changed(self, path: Path, is_directory: bool, is_growing: bool) -> None:
+        """Report a change; of what grows only a log is read before its writer has closed it."""
+        reads_on = self._logs and is_log(path.name)
+        if is_growing and not reads_on and not self._polls():
+            return
         if is_directory:
             self._queue.put(TreeChanged(path))
         elif is_cache(path.name) and path.parent in self._caches:
             self._queue.put(CacheChanged(path))
-        elif kind(path.name) or is_science(path.name):
+        elif reads_on or kind(path.name) or is_science(path.name):
             below = (place.glider_folder(path) for place in self._places)
             glider_folder = next((folder for folder in below if folder), None)
             if glider_folder:
@@ -301,7 +316,8 @@ class _Handler(FileSystemEventHandler):
             # An exception here would end watchdog's thread in silence; the rescan finds the file.
             with suppress(Exception):
                 if path:
-                    self._watcher._changed(Path(os.fsdecode(path)), event.is_directory)
+                    is_growing = isinstance(event, FileModifiedEvent)
+                    self._watcher._changed(Path(os.fsdecode(path)), event.is_directory, is_growing)
 
 
 def _full() -> OSError | None:

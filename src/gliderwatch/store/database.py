@@ -27,7 +27,7 @@ __all__ = [
     "schema",
 ]
 
-SCHEMA = 6
+SCHEMA = 7
 DELIVERY_BY_WORDS = """CASE
     WHEN delivered_at IS NULL THEN 'pending' WHEN error = '' THEN 'delivered'
     WHEN error LIKE 'withdrawn: %' THEN 'withdrawn' WHEN error LIKE 'given up: %' THEN 'unreadable'
@@ -136,6 +136,18 @@ INSERT INTO expected_6 SELECT glider, segment, opened_at, after, data FROM expec
 DROP TABLE expected;
 ALTER TABLE expected_6 RENAME TO expected;
 CREATE INDEX expected_in_order ON expected (glider, after, opened_at);
+""",
+    7: """
+CREATE TABLE calls (              -- what the log of each call has told
+    path   TEXT PRIMARY KEY,
+    glider TEXT NOT NULL,         -- as the log says; empty while it has not
+    began  REAL NOT NULL,         -- by the glider's clock, as is last_t
+    last_t REAL NOT NULL,
+    at     REAL NOT NULL,         -- when it came
+    call   TEXT NOT NULL,         -- `model.Call`
+    dialog TEXT NOT NULL          -- how far it is read: `ingest.calls.Dialog`
+) STRICT;
+CREATE INDEX calls_in_order ON calls (glider, last_t);
 """,
 }
 """SQL that leads from the schema before to the one of the key. It may call the functions of

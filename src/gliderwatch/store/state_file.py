@@ -14,10 +14,21 @@ from gliderwatch.incidents.irregularities import PLACES, Coming, Irregularity, f
 from gliderwatch.incidents.notifications import NotificationState
 from gliderwatch.incidents.overdue import Sign
 from gliderwatch.messages.unjudged_text import Unjudged
-from gliderwatch.model import Alert, Assessment, Fix, Hindrance, Incident, NextSurfacing, SegmentId, Unusable
+from gliderwatch.model import (
+    Alert,
+    Assessment,
+    Call,
+    Fix,
+    Hindrance,
+    Incident,
+    NextSurfacing,
+    SegmentId,
+    Unusable,
+)
 from gliderwatch.navigation.clock import SAME_OPENING, ClockStep
 from gliderwatch.pipeline import Outcome
 from gliderwatch.store import clocks, codec, outbox, retention
+from gliderwatch.store.calls import Calls
 from gliderwatch.store.codec import File, Status, Undelivered, file_of, values
 from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, read_only
 from gliderwatch.store.segments import RECENT, Segments
@@ -137,9 +148,23 @@ class GliderFacts:
         return [Coming(*row) for row in self._db.execute(sql, (self.glider, since, until))]
 
     def signs(self, since: float) -> tuple[Sign, ...]:
-        """Its files that were opened at `since` (s) or later, or that came since."""
+        """Its files that were opened at `since` (s) or later, or that came since, and its calls."""
         sql = "SELECT opened_at, last_t, at FROM heard WHERE glider = ?1 AND (opened_at >= ?2 OR at >= ?2)"
-        return tuple(Sign(*row) for row in self._db.execute(sql, (self.glider, since)))
+        files = (Sign(*row) for row in self._db.execute(sql, (self.glider, since)))
+        return (*files, *self._call_signs(since))
+
+    def _call_signs(self, since: float) -> Iterator[Sign]:
+        """Its calls; a state file of an earlier release, which may be looked at, has none."""
+        if not self._db.execute("SELECT 1 FROM sqlite_schema WHERE name = 'calls'").fetchone():
+            return
+        sql = "SELECT began, last_t, at FROM calls WHERE glider = ? AND last_t >= ?"
+        for row in self._db.execute(sql, (self.glider, since)):
+            yield Sign(row[0], row[1], row[2], is_call=True)
+
+    def calls(self, since: float) -> tuple[Call, ...]:
+        """Its calls that went on at `since` (s) or later, in order of time."""
+        sql = "SELECT call FROM calls WHERE glider = ? AND last_t >= ? ORDER BY began, path"
+        return tuple(values(self._db, sql, (self.glider, since), Call))
 
 
 def _of_dive(dive: Assessment) -> Unjudged:
@@ -214,6 +239,7 @@ class Store:
     def __init__(self, connection: sqlite3.Connection, path: Path | str = MEMORY) -> None:
         self._db, self._path = connection, path
         self.segments, self.notes = Segments(connection), Annotations(connection)
+        self.calls = Calls(connection)
 
     @classmethod
     def open(cls, path: Path | str, *, durable: bool = True) -> Store:

@@ -1,0 +1,119 @@
+"""Calls of a glider in which it sends no file: it lives, but is not watched. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from gliderwatch.incidents.aborts import NEWS
+from gliderwatch.incidents.constants import LONGEST_CALL
+from gliderwatch.incidents.overdue import HOUR, Sign
+from gliderwatch.messages import call_text as message
+from gliderwatch.model import Alert, Call, Severity
+
+SEVERAL = 2
+"""Calls without a file in a row that are a warning; one alone may be a dropped connection."""
+_PLACE = 1e-5
+"""Degrees by which two fixes may differ that are the same one, printed twice."""
+
+
+@dataclass(frozen=True, slots=True)
+class Empty:
+    """What people have been told of calls without a file: the first began at ``since`` (s); so many were
+    ``told`` in so many ``messages``; ``is_over`` once a file was sent again."""
+
+    id: str
+    since: float
+    told: int
+    messages: int
+    is_over: bool = False
+
+
+Surfacing = tuple[Call, ...]
+"""The connections of one stay at the surface, in order of time."""
+
+
+def surfacings(calls: Iterable[Call]) -> tuple[Surfacing, ...]:
+    """The calls (in order of time) by surfacing: several connections with one fix, or soon after another,
+    are one."""
+    out: list[list[Call]] = []
+    for call in calls:
+        if out and _is_one(out[-1], call):
+            out[-1].append(call)
+        else:
+            out.append([call])
+    return tuple(map(tuple, out))
+
+
+def _is_one(before: list[Call], call: Call) -> bool:
+    pause = call.began - max(c.last_t for c in before)
+    if pause > 6 * HOUR:
+        return False
+    fix = next((c.fix for c in reversed(before) if c.fix is not None), None)
+    if fix is None or call.fix is None:
+        return pause <= LONGEST_CALL
+    return abs(fix.lat - call.fix.lat) <= _PLACE and abs(fix.lon - call.fix.lon) <= _PLACE
+
+
+def announce(
+    glider: str, before: Empty | None, calls: tuple[Call, ...], signs: tuple[Sign, ...], now: float
+) -> tuple[Empty | None, list[Alert]]:
+    """What people have been told of calls without a file after the messages due `now` (s), and these.
+
+    `calls` are those known of the last weeks, in order of time; `signs` tells of files that came otherwise.
+    """
+    groups = surfacings(calls)
+    over = [g for k, g in enumerate(groups) if k + 1 < len(groups) or _is_over(g, now)]
+    run: list[Surfacing] = []
+    for group in over:
+        if _is_in_mission(group):  # what is at its prompt or on deck sends nothing
+            run = [] if _has_file(group, signs) else [*run, group]
+    if not run:
+        return _over(glider, before, over)
+    since, n = run[0][0].began, len(run)
+    state = before
+    if state is None or state.is_over:
+        identity = f"{glider}/call/{since:.0f}"
+        if state is not None and state.id.rstrip("+") == identity:
+            identity = state.id + "+"
+        state = Empty(identity, since, 0, 0)
+    is_due = n > state.told and (n <= SEVERAL or n >= 2 * state.told)
+    if not is_due or now - run[-1][-1].last_t >= NEWS:
+        return before, []
+    severity = Severity.INFO if n < SEVERAL else Severity.WARNING
+    last = tuple(group[-1] for group in run)
+    alert_id = f"{state.id}/{state.messages}"
+    alert = message.without_file(glider, last, alert_id=alert_id, thread=state.id, severity=severity)
+    return replace(state, told=n, messages=state.messages + 1), [alert]
+
+
+def _over(glider: str, before: Empty | None, groups: list[Surfacing]) -> tuple[Empty | None, list[Alert]]:
+    """A file was sent again."""
+    later = [] if before is None else [g for g in groups if g[0].began > before.since]
+    if before is None or before.is_over or not later:
+        return before, []
+    ended = replace(before, is_over=True)
+    if before.told < SEVERAL:
+        return ended, []
+    alert_id = f"{before.id}/{before.messages}"
+    alert = message.sends_again(glider, later[-1][-1], alert_id=alert_id, thread=before.id)
+    return replace(ended, messages=before.messages + 1), [alert]
+
+
+def _is_over(surfacing: Surfacing, now: float) -> bool:
+    """Whether a surfacing has ended: its last connection, and no further one is to come soon."""
+    last = surfacing[-1]
+    return now - last.last_t > LONGEST_CALL or (last.over and not last.calls_back)
+
+
+def _is_in_mission(surfacing: Surfacing) -> bool:
+    """Whether a mission runs, and nothing that is told as an abort (`incidents.aborts`) has happened."""
+    return any(call.mission for call in surfacing) and not any(call.happened for call in surfacing)
+
+
+def _has_file(surfacing: Surfacing, signs: Iterable[Sign]) -> bool:
+    """Whether a file was sent, or came by another way."""
+    if any(call.sent for call in surfacing):
+        return True
+    start, end = surfacing[0].began - HOUR, surfacing[-1].last_t + HOUR
+    return any(s.last_t is not None and start <= s.last_t <= end for s in signs if not s.is_call)

@@ -1,0 +1,219 @@
+"""The logs of the calls of a simulated glider, as a dockserver writes them. Pure.
+
+No public log holds a whole abort: these are made of the lines that public logs and parsers hold.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from enum import StrEnum
+from math import copysign
+from pathlib import Path
+
+import numpy as np
+
+from gliderwatch.simulate.delivery import USUAL, Act, FileForm, Step, encoded, from_glider, make_calls
+from gliderwatch.simulate.scenario import DiveTruth, Mission
+from gliderwatch.simulate.telemetry import SegmentData
+
+SERVER_AHEAD = 15.0
+"""Seconds by which the server's clock, which names the logs, is ahead of the glider's."""
+_LINES_A_SECOND = 4.0
+_CUT = 0.4
+"""Part of a call after which it is dropped."""
+
+
+class Fate(StrEnum):
+    """What becomes of a call."""
+
+    USUAL = "usual"
+    ABORT = "abort"
+    GLIDER_DOS = "glider_dos"
+    DROPPED = "dropped"
+    NO_FILE = "no_file"
+
+
+@dataclass(frozen=True, slots=True)
+class CallRates:
+    """Parts of 1: of the calls ``dropped``, and without a file (``no_file``); of the lines ``garbled``.
+
+    ``abort`` is the day of the mission from whose first call on an abort is told (None: never), by
+    ``cause``. From then on the glider waits at its prompt.
+    """
+
+    dropped: float = 0.0
+    no_file: float = 0.0
+    garbled: float = 0.0
+    abort: float | None = None
+    cause: str = "LEAK"
+
+
+@dataclass(frozen=True, slots=True)
+class CallLog:
+    """A log: its file ``name``, its ``lines`` with their ends, each with the time (s) when it is written."""
+
+    name: str
+    lines: tuple[tuple[float, bytes], ...]
+    fate: Fate
+
+    @property
+    def begun(self) -> float:
+        """When the call began (s)."""
+        return self.lines[0][0]
+
+    @property
+    def sends(self) -> bool:
+        """Whether files come in it."""
+        return self.fate in (Fate.USUAL, Fate.DROPPED)
+
+
+def call_logs(mission: Mission, rates: CallRates = CallRates(), form: FileForm = USUAL) -> Iterator[CallLog]:
+    """The log of each call of a mission, in order of time."""
+    rng, scenario = mission.scenario.rng(7), mission.scenario
+    calls = make_calls(mission)
+    told = False
+    for t, sendings in zip(calls.times, calls.sendings, strict=True):
+        chance = rng.random(4)
+        is_lost = rates.abort is not None and t >= scenario.start + rates.abort * 86400.0
+        fate = Fate.USUAL
+        if is_lost:
+            fate, told = (Fate.GLIDER_DOS, told) if told else (Fate.ABORT, True)
+        elif chance[0] < rates.dropped:
+            fate = Fate.DROPPED
+        elif chance[1] < rates.no_file:
+            fate = Fate.NO_FILE
+        files = [s.segment for s in sendings]
+        lines = [
+            *_status(mission, t, fate),
+            *_aborted(rates, t, fate, is_lost),
+            *(_transfers(files, scenario.glider, form) if fate in (Fate.USUAL, Fate.DROPPED) else ()),
+        ]
+        lines = lines[: int(_CUT * len(lines))] if fate is Fate.DROPPED else [*lines, *_end(fate)]
+        end = b"\r\n" if chance[2] < 0.5 else b"\n"
+        yield CallLog(
+            _name(scenario.glider, t, modem=chance[3] < 0.5), _written(lines, t, end, rates, rng), fate
+        )
+
+
+def _name(glider: str, t: float, *, modem: bool) -> str:
+    """Both ways in which dockservers name logs."""
+    stamp = datetime.fromtimestamp(t + SERVER_AHEAD, UTC).strftime("%Y%m%dT%H%M%S")
+    return f"{glider}_modem_{stamp}.log" if modem else f"{glider}_{stamp}_network_net_0.log"
+
+
+def _status(mission: Mission, t: float, fate: Fate) -> list[str]:
+    glider, start = mission.scenario.glider, mission.scenario.start
+    dive = next((d for d in reversed(mission.truth) if d.t_surface <= t), None)
+    now = datetime.fromtimestamp(t, UTC)
+    head = ["Connection Event: Carrier Detect found.    Iridium console active and ready..."]
+    segment = _segment(mission, dive)
+    if fate is not Fate.GLIDER_DOS and segment is not None:
+        header, short = segment.header, segment.header.short_name
+        head += [
+            f"Glider {glider} at surface.",
+            "Because:timeout expired [behavior surface_4 start_when = 2.0]",
+            f"MissionName:sim.mi MissionNum:{header.full_name} ({short[:4]}.{short[4:]})",
+        ]
+    return [
+        *head,
+        f"Vehicle Name: {glider}",
+        f"Curr Time: {now:%a %b} {now.day:2d} {now:%H:%M:%S %Y} MT: {t - start:8.0f}",
+        "GPS TooFar:   69696969.000 N 69696969.000 E measured     1e+308 secs ago",
+        *([] if dive is None else [_fix(dive, t)]),
+        "   sensor:m_battery(volts)=15.0642643455672        59.765 secs ago",
+        "   sensor:m_leakdetect_voltage(volts)=2.49996947496948       27.792 secs ago",
+        "   sensor:m_vacuum(inHg)=8.05210989010989         123.786 secs ago",
+        "devices:(t/m/s) errs:   0/   0/   0 warn:  34/   6/   1 odd: 277/  72/   4",
+    ]
+
+
+def _segment(mission: Mission, dive: DiveTruth | None) -> SegmentData | None:
+    if dive is None:
+        return None
+    return next((s for s in mission.segments if s.header.full_name == dive.segment), None)
+
+
+def _fix(dive: DiveTruth, t: float) -> str:
+    lat, lon = (_nmea(angle) for angle in (dive.end.lat, dive.end.lon))
+    return f"GPS Location:  {lat} N {lon} E measured {t - dive.t_surface:10.3f} secs ago"
+
+
+def _nmea(angle: float) -> str:
+    """Degrees and minutes; thousandths of a minute as an integer, so that there are never 60."""
+    degrees, rest = divmod(round(abs(angle) * 60_000), 60_000)
+    return f"{copysign(degrees * 100 + rest / 1000, angle):9.3f}"
+
+
+def _aborted(rates: CallRates, t: float, fate: Fate, is_lost: bool) -> list[str]:
+    if not is_lost:
+        return ["ABORT HISTORY: total since reset: 0"]
+    history = [
+        "ABORT HISTORY: total since reset: 1",
+        f"ABORT HISTORY: last abort cause: MS_ABORT_{rates.cause}",
+    ]
+    if fate is Fate.ABORT:
+        now = [
+            f"62.87 28 behavior ?_-1: abort_the_mission(1): (24)MS_ABORT_{rates.cause}",
+            "drop_the_weight = 0",
+            "Mission completed ABNORMALLY",
+        ]
+        return [*now, *history]
+    return history
+
+
+def _transfers(files: list[SegmentData], glider: str, form: FileForm) -> list[str]:
+    lines = ["START", "**B00000000000000"]
+    for file in files:
+        data, extension = encoded(file, form)
+        name = f"{file.header.short_name}.{extension}"
+        lines.append(f"Starting zModem transfer of {name} to/from {glider} size is {len(data)}")
+        lines += [f"Total Bytes sent/received: {n}" for n in range(1024, len(data), 1024)]
+        lines.append(f"zModem transfer DONE for file {name}")
+    return [*lines, "GLD: SUCCESS"]
+
+
+def _end(fate: Fate) -> list[str]:
+    if fate in (Fate.ABORT, Fate.GLIDER_DOS):
+        return ["GliderDos A 24 >Connection Event: Carrier Detect lost."]
+    if fate is Fate.NO_FILE:
+        return [
+            "behavior surface_4: TIMED OUT WAITING FOR A CHARACTER",
+            "Connection Event: Carrier Detect lost.",
+        ]
+    return ["User typed Control-R, resuming", "Connection Event: Carrier Detect lost."]
+
+
+def _written(
+    lines: list[str], t: float, end: bytes, rates: CallRates, rng: np.random.Generator
+) -> tuple[tuple[float, bytes], ...]:
+    """The lines as bytes, some of them garbled, as they come one after another from a time (s) on."""
+    out = []
+    for k, line in enumerate(lines):
+        data = bytearray(line.encode())
+        garbled, at, noise = rng.random(), rng.integers(len(data)), rng.integers(128, 256)
+        if garbled < rates.garbled:
+            data[at] = noise
+        out.append((t + k / _LINES_A_SECOND, bytes(data) + end))
+    return tuple(out)
+
+
+def as_called(order: Iterable[Step], logs: Sequence[CallLog]) -> Iterator[Step]:
+    """The steps but for those of calls in which no file is sent: what was to come then never comes."""
+    times = [log.begun for log in logs]
+    for step in order:
+        k = bisect_right(times, step.time) - 1
+        if k < 0 or logs[k].sends:
+            yield step
+
+
+def log_steps(root: Path, mission: Mission, logs: Iterable[CallLog]) -> Iterator[Step]:
+    """How the logs of the calls of one glider grow, line by line, in no order across files."""
+    folder = from_glider(root, mission).with_name("logs")
+    for log in logs:
+        last = len(log.lines) - 1
+        for k, (t, line) in enumerate(log.lines):
+            act, mtime = Act.APPEND if k else Act.BEGIN, t if k == last else None
+            yield Step(t, act, folder / log.name, line, mtime=mtime)

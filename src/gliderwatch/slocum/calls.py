@@ -1,0 +1,218 @@
+"""The log of one call, read as it grows: what it has told so far, and how far it was read.
+
+A log is never read whole into memory and never twice: what is kept is a `Dialog`, a value of bounded size.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import zlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import BinaryIO
+
+from gliderwatch.errors import Quarantine
+from gliderwatch.model import Aborts, Call, Fix, Happened, Happening
+from gliderwatch.slocum import folders, logs
+from gliderwatch.slocum.header import open_regular
+from gliderwatch.slocum.logs import LONGEST_LINE, Event, parse_line
+
+LARGEST = 16_000_000
+"""Bytes of a log that are read: the longest call of a glider makes some hundred kilobytes."""
+_PIECE = 1 << 16
+_HEAD = 512
+_MOST = 50
+"""Files, happenings and names kept of one log."""
+_APART = 2 * 86400.0
+"""Seconds by which the glider's clock may be off the server's; a time further off is garbled."""
+_ENDS = re.compile(rb"\r\n|\n|\r")
+_PROMPT = re.compile(rb"GliderDos [AIN] -?\d{1,3} ?>\s*\Z")
+
+
+@dataclass(frozen=True, slots=True)
+class Dialog:
+    """What the log of a call has told up to a byte (``offset``) of the file ``inode``, which begins as
+    ``head`` (a checksum) says.
+
+    ``call`` is that; ``names`` are the vehicle names read, with how often; ``t`` is the glider's time (s);
+    ``aborts`` an abort history that is still being printed; ``by_pilot`` whether a pilot stopped the mission.
+    """
+
+    call: Call
+    inode: int = 0
+    head: int = 0
+    offset: int = 0
+    names: tuple[tuple[str, int], ...] = ()
+    t: float = 0.0
+    aborts: Aborts | None = None
+    by_pilot: bool = False
+
+
+def begun(name: str) -> Dialog:
+    """The dialog of a log of which nothing is read."""
+    t = folders.stamp(name) or 0.0
+    return Dialog(Call("", name, t, t), t=t)
+
+
+def read_log(path: Path, before: Dialog | None = None) -> Dialog:
+    """What a log tells by now; only what came since `before` is read, if it is still the same file.
+
+    Raises `Quarantine` for what is no regular file or too large, `Retry` if it cannot be read now.
+    """
+    with open_regular(path) as file:
+        status = os.fstat(file.fileno())
+        dialog = before
+        if dialog is None or dialog.inode != status.st_ino or _head(file, dialog.offset) != dialog.head:
+            dialog = replace(begun(path.name), inode=status.st_ino)
+        if status.st_size > LARGEST:
+            raise Quarantine(f"larger than {LARGEST / 1e6:.0f} MB: no log of one call")
+        file.seek(dialog.offset)
+        dialog = _read(file, dialog)
+        return replace(dialog, head=_head(file, dialog.offset))
+
+
+def _head(file: BinaryIO, offset: int) -> int:
+    """A checksum of how a file begins, up to an offset; a new file may have the inode of one that is gone."""
+    file.seek(0)
+    return zlib.crc32(file.read(min(offset, _HEAD)))
+
+
+def _read(file: BinaryIO, dialog: Dialog) -> Dialog:
+    """The dialog after what follows in a file up to its last whole line, or a prompt that waits behind it."""
+    offset, rest = dialog.offset, b""
+    while piece := file.read(_PIECE):
+        offset += len(piece)
+        lines, rest = split(rest + piece)
+        for line in lines:
+            dialog = heard(dialog, line)
+    if _PROMPT.search(rest):
+        return replace(heard(dialog, rest), offset=offset)
+    return replace(dialog, offset=offset - len(rest))
+
+
+def split(data: bytes) -> tuple[list[bytes], bytes]:
+    """The whole lines of some bytes, whatever ends them, and the beginning of the next, never a long one."""
+    *lines, rest = _ENDS.split(data)
+    if len(rest) > _PIECE:
+        lines, rest = [*lines, rest[:LONGEST_LINE]], b""
+    return lines, rest
+
+
+def heard(dialog: Dialog, line: bytes) -> Dialog:
+    """The dialog after one more line."""
+    for event in parse_line(line):
+        dialog = after(dialog, event)
+    return dialog
+
+
+def after(dialog: Dialog, event: Event) -> Dialog:
+    """The dialog after one more event."""
+    dialog = _happening(_aborts(dialog, event), event)
+    match event:
+        case logs.Clock():
+            return _timed(dialog, event.t)
+        case logs.Vehicle():
+            return _named(dialog, event.name)
+        case logs.PilotThere():
+            return replace(dialog, by_pilot=dialog.by_pilot or event.ends)
+    return replace(dialog, call=_told(dialog.call, event, dialog.t))
+
+
+def _told(call: Call, event: Event, t: float) -> Call:
+    """The call after an event at a time (s)."""
+    match event:
+        case logs.Position():
+            call = replace(call, fix=Fix(t - event.age, event.lat, event.lon))
+        case logs.Carrier():
+            call = replace(call, over=not event.found)
+        case logs.HangUp():
+            call = replace(call, calls_back=call.calls_back or event.minutes is not None)
+        case logs.Mission():
+            call = replace(call, mission=event.name, mission_t=t, segment=event.segment)
+        case logs.Because():
+            call = replace(call, reason=event.reason)
+        case logs.Waypoint():
+            call = replace(call, waypoint=(event.lat, event.lon))
+        case logs.Transfer():
+            call = _transferred(call, event)
+    return call
+
+
+def _timed(dialog: Dialog, t: float) -> Dialog:
+    """The dialog at a time (s) of the glider; one that cannot be is garbled."""
+    call, at = dialog.call, folders.stamp(dialog.call.log)
+    if at is not None and abs(t - at) > _APART:
+        return dialog
+    first = dialog.t == call.began == call.last_t == (at or 0.0)
+    began = t if first else min(call.began, t)
+    return replace(
+        dialog, t=t, call=replace(call, began=began, last_t=max(t, began if first else call.last_t))
+    )
+
+
+def _named(dialog: Dialog, name: str) -> Dialog:
+    """The glider is the one that is named most often: a line of it may be garbled."""
+    counts = dict(dialog.names)
+    if name in counts or len(counts) < _MOST:
+        counts[name] = counts.get(name, 0) + 1
+    best = max(counts, key=lambda n: counts[n])
+    return replace(dialog, names=tuple(counts.items()), call=replace(dialog.call, glider=best))
+
+
+def _transferred(call: Call, event: logs.Transfer) -> Call:
+    announced, sent = call.announced, call.sent
+    if event.file not in announced:
+        announced = (*announced, event.file)[-_MOST:]
+    if event.done and event.file not in sent:
+        sent = (*sent, event.file)[-_MOST:]
+    return replace(call, announced=announced, sent=sent)
+
+
+def _aborts(dialog: Dialog, event: Event) -> Dialog:
+    """Put the abort history together, whose lines follow each other; it counts once it is whole."""
+    pending = dialog.aborts
+    match event:
+        case logs.AbortCount() if event.count > 0:
+            return replace(_printed(dialog), aborts=Aborts(event.count, dialog.t))
+        case logs.AbortCount():
+            return _printed(replace(_printed(dialog), aborts=Aborts(0, dialog.t)))
+        case logs.AbortCause() if pending is not None:
+            return replace(dialog, aborts=replace(pending, cause=event.cause))
+        case logs.AbortTime() if pending is not None:
+            return _printed(replace(dialog, aborts=replace(pending, t=event.t)))
+    return dialog if pending is None else _printed(dialog)
+
+
+def _printed(dialog: Dialog) -> Dialog:
+    new, call = dialog.aborts, dialog.call
+    if new is None:
+        return dialog
+    last = call.aborts[-1] if call.aborts else None
+    if last is None or (last.count, last.cause, last.t) != (new.count, new.cause, new.t):
+        call = replace(call, aborts=(*call.aborts, new)[-_MOST:])
+    return replace(dialog, aborts=None, call=call)
+
+
+def _happening(dialog: Dialog, event: Event) -> Dialog:
+    found: tuple[Happening, str] | None = None
+    match event:
+        case logs.AbortNow():
+            found = Happening.ABORTING, event.cause
+        case logs.FellOut():
+            found = Happening.FELL_OUT, ""
+        case logs.LastMission():
+            found = Happening.LAST_MISSION, event.name
+        case logs.Prompt():
+            found = Happening.GLIDER_DOS, f"{event.end} {event.code}"
+        case logs.Emergency():
+            found = Happening.EMERGENCY, ""
+        case logs.WeightDropped():
+            found = Happening.WEIGHT_DROPPED, ""
+        case logs.Reading(sensor="m_weight_drop", value=value) if value >= 0.5:
+            found = Happening.WEIGHT_DROPPED, ""
+    call = dialog.call
+    if found is None or any((h.what, h.cause) == found for h in call.happened):
+        return dialog
+    happened = (*call.happened, Happened(found[0], dialog.t, found[1], dialog.by_pilot))
+    return replace(dialog, call=replace(call, happened=happened[:_MOST]))
