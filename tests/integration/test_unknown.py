@@ -181,7 +181,7 @@ def test_dives_that_come_and_have_no_flag(copied) -> None:
     folder, files = copied
     live = fed(Live([folder / "cache"]), files, onset(files))
     for path, at in files[onset(files) :]:
-        segment = without(decode(path, [folder / "cache"]), "heading", "heading_commanded")
+        segment = without(decode(path, [folder / "cache"]), "heading", "heading_commanded", "depth", "pitch")
         found = triage.triage(path, live.store, live.caches, lambda glider: True)
         assert isinstance(found, Job)
         live.alerts += transaction.process_file(

@@ -7,7 +7,7 @@ import pytest
 
 from gliderwatch.model import Current, DiveFeatures, Fix, Unusable
 from gliderwatch.navigation.dac import Report, new_reports, pair, updated
-from gliderwatch.navigation.dives import Navigation, extend, flight_notes, why_unusable
+from gliderwatch.navigation.dives import Navigation, extend, flight_notes, unsteered, why_unusable
 from gliderwatch.navigation.features import flight_features
 from gliderwatch.navigation.fixes import new_fixes
 from gliderwatch.navigation.flight import Flight, find_flight, lengthened
@@ -194,19 +194,21 @@ class TestUnusable:
         assert self.why(metres=32_000.0) is Unusable.WILD_FIX
 
     def test_eight_tenths_of_a_flight_on_a_steady_course_may_lack_headings(self):
-        assert self.why(course([0.0, 50.0, 7900.0, 9000.0], 0.0)) is None
-        assert self.why(course([0.0, 50.0, 8200.0, 9000.0], 0.0)) is Unusable.NO_HEADING
+        assert unsteered(course([0.0, 50.0, 7900.0, 9000.0], 0.0), FLIGHT)[0] is None
+        assert unsteered(course([0.0, 50.0, 8200.0, 9000.0], 0.0), FLIGHT)[0] is Unusable.NO_HEADING
 
     @pytest.mark.parametrize("gap, usable", [(3500.0, True), (3700.0, False)])
     def test_an_hour_without_a_heading_is_too_long_for_a_glider_that_turns(self, gap, usable):
         times = np.concatenate([np.arange(0.0, 3001.0, 500.0), np.arange(3000.0 + gap, 10_001.0, 500.0)])
-        assert (self.why(course(times, np.where(np.arange(len(times)) % 2, 60.0, -60.0))) is None) == usable
+        assert (
+            unsteered(course(times, np.where(np.arange(len(times)) % 2, 60.0, -60.0)), FLIGHT)[0] is None
+        ) == usable
 
     @pytest.mark.parametrize("turn, steady", [(22.0, True), (30.0, False)])
     def test_a_course_is_steady_within_25_degrees(self, turn, steady):
         times = np.concatenate([np.arange(0.0, 3001.0, 500.0), np.arange(7000.0, 10_001.0, 500.0)])
         aside = np.where(np.arange(len(times)) % 2, turn, -turn)
-        assert (self.why(course(times, aside)) is None) == steady
+        assert (unsteered(course(times, aside), FLIGHT)[0] is None) == steady
 
     @pytest.mark.parametrize("length, noted", [(0.45, True), (0.55, False)])
     def test_a_glider_that_turned_much_is_noted(self, length, noted):

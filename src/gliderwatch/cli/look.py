@@ -22,6 +22,8 @@ SAMPLES = (
     "false_alarm",
     "overdue",
     "unknown",
+    "abort",
+    "call",
     "all_clear",
     "reminder",
     "correction",

@@ -47,7 +47,7 @@ def learn_process_scale(factor: float, square: float | None, share: float, dives
     innovation's variance depends on the factor: where the tides are not known yet it is small, and little is
     learnt. ``dives`` so far.
 
-    >>> round(learn_sea(1.0, 2.0, 0.5, dives=4), 3)
+    >>> round(learn_process_scale(1.0, 2.0, 0.5, dives=4), 3)
     1.2
     """
     return _within(factor * (1 + 2 * min(2 * share, 1.0) * _part(dives) * _excess(square)), SEA)

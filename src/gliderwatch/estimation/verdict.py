@@ -299,8 +299,10 @@ def _trim(dive: Dive) -> Trim:
 def retrimmed(before: Trim, now: Trim) -> bool:
     """Whether the pilot changed pitch or ballast between two dives.
 
-    >>> retrimmed((-0.45, 0.45, None, None), (-0.35, 0.36, None, None)), retrimmed((), (-0.45, 0.45, None,
-    None)) (True, False)
+    >>> retrimmed((-0.45, 0.45, None, None), (-0.35, 0.36, None, None))
+    True
+    >>> retrimmed((), (-0.45, 0.45, None, None))
+    False
     """
     pairs = zip(before, now, RETRIMMED, strict=False)
     return any(a is not None and b is not None and abs(a - b) > least for a, b, least in pairs)

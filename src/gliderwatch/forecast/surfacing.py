@@ -147,7 +147,7 @@ def read_waypoints(known: WaypointLog, segment: Segment) -> WaypointLog:
 def active_waypoint(known: WaypointLog, t: float) -> Place | None:
     """The waypoint at a fix at time ``t`` (s), of those told; None before any.
 
-    >>> bound_for(((0.0, 27.0, -84.0), (9000.0, 27.5, -84.0)), 8000.0)
+    >>> active_waypoint(((0.0, 27.0, -84.0), (9000.0, 27.5, -84.0)), 8000.0)
     (27.0, -84.0)
     """
     before = [(lat, lon) for told, lat, lon in known if told <= t + WAYPOINT_LATE]

@@ -8,9 +8,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from gliderwatch.messages import incident_text, overdue_text, unjudged_text
+from gliderwatch.messages import call_text, incident_text, overdue_text, unjudged_text
 from gliderwatch.messages.template import with_lead
-from gliderwatch.model import Alert, Assessment, Flag, Hindrance, Incident, Kind, NextSurfacing, Severity
+from gliderwatch.model import (
+    Alert,
+    Assessment,
+    Call,
+    Fix,
+    Flag,
+    Happening,
+    Hindrance,
+    Incident,
+    Kind,
+    NextSurfacing,
+    Severity,
+)
 
 GLIDER = "sample-glider"
 _LEAD = "This is a sample, sent by `gliderwatch test-alert`: there is no such glider, and nothing is wrong."
@@ -141,6 +153,29 @@ def _unknown(now: float) -> Alert:
     return unjudged_text.blind(found, alert_id="", thread="", first=True)
 
 
+def _call(now: float) -> Call:
+    return Call(
+        glider=GLIDER,
+        log=f"{GLIDER}_network_net_0.log",
+        began=now - 300.0,
+        last_t=now,
+        fix=Fix(now - 240.0, 24.21, -83.01),
+        reason="pitch not commanded",
+        mission="coast.mi",
+        mission_t=now - 240.0,
+    )
+
+
+def _abort(now: float) -> Alert:
+    found = call_text.Told(Happening.ABORTING, now, "LEAK", Severity.CRITICAL)
+    return call_text.aborted(GLIDER, (found,), _call(now), alert_id="", thread="")
+
+
+def _without_file(now: float) -> Alert:
+    calls = (_call(now - 3 * _HOUR), _call(now))
+    return call_text.without_file(GLIDER, calls, alert_id="", thread="", severity=Severity.WARNING)
+
+
 def _surfacing(now: float) -> Alert:
     expected = NextSurfacing(now, now + 4 * _HOUR, 1500.0, 24.21, -83.01, 1e6, 0.0, 1e6, "its last dives")
     dive = _at(_HEALTHY, now)
@@ -163,6 +198,8 @@ SAMPLES: dict[Kind, Callable[[float], Alert]] = {
     Kind.FALSE_ALARM: _opened(Kind.FALSE_ALARM, _DISAGREE, Severity.WARNING),
     Kind.OVERDUE: _overdue,
     Kind.UNKNOWN: _unknown,
+    Kind.ABORT: _abort,
+    Kind.CALL: _without_file,
     Kind.ALL_CLEAR: _all_clear,
     Kind.REMINDER: _reminder,
     Kind.CORRECTION: _correction,

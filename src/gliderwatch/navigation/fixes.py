@@ -79,7 +79,8 @@ def _agree(a: Fix | None, b: Fix | None) -> bool:
 def surface_intervals(fixes: list[Fix], apart: float) -> list[tuple[Fix, Fix]]:
     """The first and the last fix of each stay, in which none is more than ``apart`` (s) after the one before.
 
-    >>> [(a.t, b.t) for a, b in stays([Fix(t, 0.0, 0.0) for t in (0.0, 60.0, 120.0, 9000.0)], 120.0)]
+    >>> fixes = [Fix(t, 0.0, 0.0) for t in (0.0, 60.0, 120.0, 9000.0)]
+    >>> [(a.t, b.t) for a, b in surface_intervals(fixes, 120.0)]
     [(0.0, 120.0), (9000.0, 9000.0)]
     """
     out: list[tuple[Fix, Fix]] = []
