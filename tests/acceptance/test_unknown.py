@@ -9,6 +9,7 @@ from acceptance.support import TRACEBACK, Daemon, Site, command, lines, mail_ser
 from gliderwatch.simulate.delivery import arrivals, cache, write_cache
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Mission, Scenario
+from gliderwatch.slocum.caches import checksum
 from gliderwatch.slocum.header import parse_header
 from gliderwatch.store.state_file import Status
 
@@ -18,11 +19,18 @@ HEALTHY = 42
 """Files before somebody changed the sbd list."""
 
 
-def other_list(data: bytes, number: int) -> bytes:
+def changed(made: Mission) -> tuple[str, bytes]:
+    """The sensor list after the change, and its checksum: another unit of a sensor that is not sent."""
+    text = cache(made)[f"{parse_header(next(iter(arrivals(made))).data).crc}.cac"]
+    unsent = next(line for line in text.splitlines(keepends=True) if line.split()[3] == b"-1")
+    other = text.replace(unsent, unsent.rstrip() + b"2\n")
+    return checksum(other), other
+
+
+def other_list(data: bytes, number: int, crc: str) -> bytes:
     """A file as it came; after the change its header names another cache file."""
-    crc = parse_header(data).crc.encode()
-    at = data.lower().index(crc)
-    return data if number < HEALTHY else data[:at] + b"deadbeef" + data[at + 8 :]
+    at = data.lower().index(parse_header(data).crc.encode())
+    return data if number < HEALTHY else data[:at] + crc.encode() + data[at + 8 :]
 
 
 def mission(end: float) -> Mission:
@@ -32,20 +40,20 @@ def mission(end: float) -> Mission:
 
 def test_pilots_hear_that_nothing_can_be_judged_and_that_it_can_again(tmp_path: Path) -> None:
     site, made = Site(tmp_path), mission(time.time())
+    crc, text = changed(made)
     site.caches(made)
     with mail_server() as box:
         site.configure(GLIDER, url=box.url, defaults={})
         for number, file in enumerate(arrivals(made)):
-            site.put(GLIDER, file.name, other_list(file.data, number))
+            site.put(GLIDER, file.name, other_list(file.data, number, crc))
         with Daemon(site) as daemon:
             until(lambda: box.mails, "the pilot is told")
             assert [f.status for f in site.files().values()].count(Status.WAITING) > 60
             (mail,) = box.mails
             assert "CANNOT BE JUDGED cora: " in mail.subject
-            assert f"cache file deadbeef.cac is missing: not in {site.cache}" in mail.text
-            assert "copy deadbeef.cac from the dockserver" in mail.text
-            lost = parse_header(next(iter(arrivals(made))).data).crc
-            (site.cache / "deadbeef.cac").write_bytes(cache(made)[f"{lost}.cac"])
+            assert f"cache file {crc}.cac is missing: not in {site.cache}" in mail.text
+            assert f"copy {crc}.cac from the dockserver" in mail.text
+            (site.cache / f"{crc}.cac").write_bytes(text)
             until(lambda: len(box.mails) == 2, "the pilot is told that it is over")
             until(lambda: Status.WAITING not in {f.status for f in site.files().values()}, "all is taken")
     assert "ALL CLEAR cora: its dives can be judged again" in box.mails[1].subject
@@ -59,7 +67,7 @@ def test_the_replay_command_says_the_same(tmp_path: Path) -> None:
     for number, file in enumerate(arrivals(made)):
         path = tmp_path / "gliders" / file.name
         path.parent.mkdir(exist_ok=True)
-        path.write_bytes(other_list(file.data, number))
+        path.write_bytes(other_list(file.data, number, "deadbeef"))
     result = command("run", "--replay", tmp_path / "gliders", "--out", tmp_path / "out")
     assert result.returncode == 0, result.stderr
     told = lines(tmp_path / "out" / "alerts.jsonl")

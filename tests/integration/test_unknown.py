@@ -177,18 +177,25 @@ def test_files_that_an_error_of_the_program_quarantines(copied, monkeypatch: pyt
 
 
 def test_dives_that_come_and_have_no_flag(copied) -> None:
-    """Nothing is wrong with the files, but the glider sends no heading any more."""
+    """Nothing is wrong with the files, but the glider sends nothing any more that tells its speed."""
     folder, files = copied
     live = fed(Live([folder / "cache"]), files, onset(files))
     for path, at in files[onset(files) :]:
-        segment = without(decode(path, [folder / "cache"]), "heading", "heading_commanded", "depth", "pitch")
+        segment = without(decode(path, [folder / "cache"]), *UNSEEN)
         found = triage.triage(path, live.store, live.caches, lambda glider: True)
         assert isinstance(found, Job)
         live.alerts += transaction.process_file(
             live.store, found.file, segment, GliderParams(), live.speaking, at
         ).alerts
     first = is_told_once_and_in_time(live, files)
-    assert "no heading for" in first.body and "add m_heading" in first.body
+    assert "gliderwatch doctor" in first.body or "add m_heading" in first.body
+
+
+UNSEEN = (
+    *("heading", "heading_commanded", "dr_lat", "dr_lon", "speed_onboard", "pitch", "depth_rate"),
+    *(f"current{part}_{axis}" for part in ("", "_initial", "_final") for axis in "xy"),
+)
+"""What tells course, current and glide: depth alone shows that it dives, and not how fast it flies."""
 
 
 def without(segment: Segment, *names: str) -> Segment:
