@@ -3,15 +3,11 @@
 After a change that is meant to change them: `python tests/golden/regenerate.py`, and read the diff.
 """
 
-import time
-from statistics import median
-
 import pytest
 from ruamel.yaml import YAML
 
-from gliderwatch.service.routing import Routing
 from golden_statistics import golden_file, median_misfit, statistics
-from missions import REAL, feed, real
+from missions import REAL, real
 
 pytestmark = pytest.mark.real
 
@@ -65,17 +61,3 @@ def test_without_a_variation_in_the_files_the_model_closes_it(shared_data):
     both = median_misfit(segments, rotate_heading=True, rotate_current=True)
     neither = median_misfit(segments, rotate_heading=False, rotate_current=False)
     assert both < 0.012 and neither > 2.5 * both
-
-
-@pytest.mark.timing
-def test_a_month_of_files_is_taken_in_within_two_seconds(shared_data):
-    """Seconds of one core for 300 decoded files, from segment to state file, in memory; median of 3."""
-    missions = [real(shared_data, name) for name in REAL]
-    speaking = Routing(channels=lambda alert: ["mail"], notices=lambda glider: True)
-    spent = []
-    for _ in range(3):
-        start = time.process_time()
-        for segments in missions:
-            feed(segments, speaking=speaking)
-        spent.append(time.process_time() - start)
-    assert median(spent) * 300 / sum(map(len, missions)) < 2.0
