@@ -36,7 +36,7 @@ from acceptance.support import Site, mail_server
 
 _CHANNELS = ("pilot", "boat")
 _NOT_HERE = """not injected here, for it takes the program or the whole machine; each has a test in tests/:
-  web hook 429 and 500, DNS gone, limit of inotify watches, glider clock wrong, leap day and DST,
+  web hook 429 and 500, DNS gone, limit of inotify watches, leap day and DST,
   state file destroyed wholly (then open incidents are told again)"""
 
 

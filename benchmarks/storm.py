@@ -17,6 +17,7 @@ from acceptance.chaos import Chaos, hooked
 from acceptance.disk import Disk
 from acceptance.hostile import program
 from acceptance.support import Mailbox, Site, until
+from clocks import WEEKS, files_with_clock_set
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Fault, FaultKind, Mission, Scenario
 
@@ -33,8 +34,12 @@ _AFTERMATH = 60.0
 """Seconds after a fault of state or configuration within which a start may still fail by it."""
 
 
+CLOCKS = {"ada": -5 * 3600.0, "emil": -WEEKS}
+"""By how much (s) the clock of a healthy glider falls back, half way."""
+
+
 def fleet(days: float) -> list[Mission]:
-    """Six gliders, four of them with something that goes wrong on the way."""
+    """Six gliders: four with something that goes wrong on the way, two whose clock falls back."""
     day, start = 86400.0, Scenario().start
     wrong = [
         [],
@@ -45,9 +50,13 @@ def fleet(days: float) -> list[Mission]:
         [Fault(FaultKind.REMORA, start + 0.6 * days * day, 5.0)],
     ]
     names = ["ada", "bruce", "carol", "dora", "emil", "frida"]
-    return [
+    missions = [
         simulate(Scenario(seed=30 + number, glider=name, days=days, faults=tuple(faults)))
         for number, (name, faults) in enumerate(zip(names, wrong, strict=True))
+    ]
+    return [
+        files_with_clock_set(mission, len(mission.segments) // 2, CLOCKS[name]) if name in CLOCKS else mission
+        for name, mission in zip(names, missions, strict=True)
     ]
 
 
