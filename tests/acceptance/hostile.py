@@ -17,8 +17,8 @@ _PROGRAM = """
 import functools, sys
 sys.path[:0] = {folders!r}
 from acceptance.hostile import misbehave
-from gliderwatch.service import parts
-parts.Decoder = functools.partial(parts.Decoder, decode=misbehave, timeout={timeout})
+from gliderwatch.service import runtime
+runtime.Decoder = functools.partial(runtime.Decoder, decode=misbehave, timeout={timeout})
 from gliderwatch.cli.main import main
 if __name__ == "__main__":
     main()

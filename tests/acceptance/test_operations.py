@@ -24,11 +24,11 @@ NOWHERE = "/nonexistent"
 """A PATH without timedatectl: what this machine says of its clock is no part of the test."""
 QUICK = """\
 import functools, sys
-from gliderwatch.service import daemon, heartbeat, parts
+from gliderwatch.service import daemon, heartbeat, runtime
 from bad_decode import misbehave
 from gliderwatch.cli.main import main
 daemon.BEAT, heartbeat.DECODING = 0.2, 1.0
-parts.Decoder = functools.partial(parts.Decoder, decode=misbehave)
+runtime.Decoder = functools.partial(runtime.Decoder, decode=misbehave)
 sys.argv[0] = "gliderwatch"
 main()
 """
