@@ -55,7 +55,9 @@ def check_assessment(line: dict[str, Any]) -> None:
         assert line[name] is None or isinstance(line[name], int | float), name
     assert line["lat"] is None or abs(line["lat"]) <= 90
     assert line["flag"] is None or line["lat"] is not None
-    assert line["flag"] is None or line["speed"] is not None or "by depth rate and pitch alone" in line["reason"]
+    assert (
+        line["flag"] is None or line["speed"] is not None or "by depth rate and pitch alone" in line["reason"]
+    )
     assert (line["reference_u"] is None) <= (line["p_e"] is None)
     assert line["p_e"] is None or 0 <= line["p_e"] <= 1
     assert 0 <= line["speed_min"] < line["speed_max"]
