@@ -222,6 +222,9 @@ def connect(path: Path | str, *, durable: bool = True) -> sqlite3.Connection:
             connection.execute("PRAGMA foreign_keys = ON")
             connection.row_factory = sqlite3.Row
             _migrate(connection, path)
+            if path != MEMORY:
+                status = Path(path).stat()
+                _OURS.add((status.st_dev, status.st_ino))
         except BaseException:
             connection.close()
             raise
@@ -245,10 +248,25 @@ def read_only(path: Path) -> sqlite3.Connection:
 
 
 def refuse_foreign(path: Path, cure: str = "Name another file in state.path, or move this one away") -> None:
-    """Raises StateError where there is a file at `path` that is not gliderwatch's. Nothing is written."""
+    """Raises StateError where there is a file at `path` that is not gliderwatch's. Nothing is written.
+
+    A file is looked at once in a process, before any connection to it: to close a file drops the locks that
+    SQLite holds on it anywhere in the process, and another program would then take its log away.
+    """
+    try:
+        status = path.stat()
+    except OSError:
+        return
+    if (status.st_dev, status.st_ino) in _OURS:
+        return
     why = foreign(path, _table_names())
     if why is not None:
         raise StateError(f"state file {path} is not gliderwatch's: {why}. It is left alone. {cure}")
+    _OURS.add((status.st_dev, status.st_ino))
+
+
+_OURS: set[tuple[int, int]] = set()
+"""Device and inode of the files of this process that are ours."""
 
 
 @cache
