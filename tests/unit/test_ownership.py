@@ -68,6 +68,8 @@ def test_a_pipe_is_refused_and_not_read(path: Path) -> None:
 def test_tables_that_gliderwatch_once_added_to_anothers_database_make_it_no_state_file(path: Path) -> None:
     path.write_bytes(gzip.decompress(GOLDEN.read_bytes()))
     refuse_foreign(path)
+    path = path.with_name("another.sqlite")  # a file that was found to be ours is not looked at again
+    path.write_bytes(gzip.decompress(GOLDEN.read_bytes()))
     database(path, "CREATE TABLE contacts (name)")
     with pytest.raises(StateError, match=r"tables of another program \(contacts\)"):
         Store.open(path)
