@@ -463,7 +463,9 @@ def test_a_state_file_that_is_damaged(examined: Doctor, tree: Path) -> None:
 
 
 def test_a_state_file_that_is_none(examined: Doctor, tree: Path) -> None:
-    (tree / "state" / "s.sqlite").write_bytes(b"not a database" * 1000)
+    other = tree / "state" / "other"
+    other.write_bytes(b"not a database" * 1000)
+    other.replace(tree / "state" / "s.sqlite")
     assert one([f for f in examined() if f.topic == "state"], Level.ERROR, "state", "a text file")
 
 
