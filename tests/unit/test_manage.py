@@ -16,8 +16,7 @@ from rich.console import Console
 from alert_support import DISAGREE, SLOW, alert, incident
 from announcing import Talk, World
 from gliderwatch.cli import manage, tables
-from gliderwatch.cli.incident_list import ack, incident_entries
-from gliderwatch.cli.status import as_json, overview
+from gliderwatch.cli.status import ack, incident_entries, overview, status_as_json
 from gliderwatch.config import Config, load
 from gliderwatch.errors import GliderwatchError, StateError
 from gliderwatch.incidents.acknowledgement import acknowledge, with_mute
@@ -299,7 +298,7 @@ class TestWaiting:
         monkeypatch.setattr("gliderwatch.cli.status.time.time", lambda: NOW + 60)
         view = overview(config)
         assert [u.channel for u in view.undelivered] == ["mail"]
-        assert as_json(view)["held"] == [
+        assert status_as_json(view)["held"] == [
             {
                 "alert": "a1",
                 "channel": "sms",
