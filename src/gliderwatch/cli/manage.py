@@ -209,11 +209,11 @@ def ack(config_path: Path, incident: str, by: str | None, note: str) -> None:
     import getpass
 
     from gliderwatch.cli import tables
-    from gliderwatch.cli.status import incident_entries, incidents_as_json
+    from gliderwatch.cli.status import acknowledge_incident
     from gliderwatch.config import load
 
     who = by or os.environ.get("SUDO_USER") or getpass.getuser()
-    noted, is_new = manage.ack(load(config_path), incident, who, note, time.time())
+    noted, is_new = acknowledge_incident(load(config_path), incident, who, note, time.time())
     click.echo("acknowledged" if is_new else "was acknowledged already, nothing changed")
     tables.incidents([noted], Console())
 

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from gliderwatch.cli.manage import known_glider
 from gliderwatch.config import Config, expand
-from gliderwatch.config.fields import is_folder
 from gliderwatch.errors import GliderwatchError, Quarantine, StateError
 from gliderwatch.incidents.constants import SPEED_CHANGE
 from gliderwatch.incidents.notifications import as_notified
@@ -24,6 +23,7 @@ from gliderwatch.service.runtime import OceanCache
 from gliderwatch.slocum import folders
 from gliderwatch.slocum.caches import lists_folder
 from gliderwatch.slocum.decode import Decoder
+from gliderwatch.slocum.folders import is_folder
 from gliderwatch.store import maintenance
 from gliderwatch.store.database import connect, read_only
 from gliderwatch.store.state_file import File, Status, Store
