@@ -23,7 +23,7 @@ from gliderwatch.messages.formatting import clean
 from gliderwatch.model import Alert, Hindrance, Segment
 from gliderwatch.navigation.clock import Stamp, corrections, is_same, numbered
 from gliderwatch.params import GliderParams
-from gliderwatch.service import intake, transaction
+from gliderwatch.service import judgement, transaction
 from gliderwatch.service.backlog import Job
 from gliderwatch.service.jsonl import alert_line, assessment_line, write_lines
 from gliderwatch.service.liveness import alive_path
@@ -332,7 +332,7 @@ def _triage(
     jobs, noted = list[Job](), list[File]()
 
     def look(path: Path) -> None:
-        found = intake.triage(path, report.store, caches, request.is_wanted)
+        found = judgement.judge(path, report.store, caches, request.is_wanted)
         if isinstance(found, Job):
             lists.keep(path, found.header)
             jobs.append(found)
@@ -416,7 +416,7 @@ def _take(
         ocean = None if report.ocean is None else report.ocean.field(glider)
         taken = transaction.process_file(report.store, job.file, job.result, params, told, sent, ocean=ocean)
     except (Quarantine, Retry) as error:
-        taken = transaction.record_file(report.store, intake.failed(job.file, error), params, told, sent)
+        taken = transaction.record_file(report.store, judgement.failed(job.file, error), params, told, sent)
     report.coming[glider].popleft()
     report.clock[glider] = max(sent, report.clock.get(glider, sent))
     _count(replace(taken, alerts=(*ticked, *taken.alerts)), report, on_file)
