@@ -314,8 +314,8 @@ class Intake:
         self.send(transaction.notify_pilots(self._store, glider, params, self._runtime.routing, time.time()))
 
     def _routing_if_last(self, glider: str) -> Routing | None:
-        """Who is notified of a glider; None while more of its files are at hand, or may be: the last speaks for
-        all."""
+        """Who is notified of a glider; None while more of its files are at hand, or may be: then the last
+        of them is reported for all."""
         last = self._is_known(glider) and not self._runtime.backlog.more(glider)
         return self._runtime.routing if last and not self._may_more_come(glider) else None
 
