@@ -21,12 +21,12 @@ from rich.console import Console
 import dinkum
 from gliderwatch.cli import tables
 from gliderwatch.cli import tables as frames
-from gliderwatch.cli.status import Overview, as_json
+from gliderwatch.cli.status import Overview, status_as_json
 from gliderwatch.config import Problem
 from gliderwatch.delivery.channels import Channel
 from gliderwatch.delivery.mail import Envelope, compose
 from gliderwatch.errors import Quarantine
-from gliderwatch.messages import incident_text
+from gliderwatch.messages import notice_text
 from gliderwatch.model import Alert, Severity
 from gliderwatch.service import logs
 from gliderwatch.service.transaction import FileOutcome
@@ -48,7 +48,7 @@ UNKNOWN = File(PATH, 1, 2, Status.UNKNOWN, NASTY, NASTY, NASTY)
 
 def operator(text: str) -> Alert:
     """A message of which every part comes from outside."""
-    return incident_text.operator(
+    return notice_text.operator(
         text,
         f"first\n{text}",
         1.7e9,
@@ -176,7 +176,7 @@ def test_status_is_harmless() -> None:
     tables.status(view, console)
     assert is_harmless(stream.getvalue())
     assert "[bold]x[/]" in stream.getvalue()
-    (told,) = json.loads(json.dumps(as_json(view)))["quarantined"]
+    (told,) = json.loads(json.dumps(status_as_json(view)))["quarantined"]
     assert told["path"] == PATH
 
 
