@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from gliderwatch.errors import GliderwatchError
+from gliderwatch.model import Segment, SegmentId
+
 if TYPE_CHECKING:
+    from gliderwatch.layers.casts import Cast
     from gliderwatch.papers.seeking_vehicle import Preset, Run
 
 _NOISE = 0.002
@@ -51,6 +58,72 @@ def simulate(name: str, seed: int, out: Path, as_json: bool) -> None:
         return
     for key, value in found.items():
         click.echo(f"{key.replace('_', ' ')}: {value}")
+
+
+@layers.command(epilog="\b\nExample:\n  gliderwatch layers replay data/electa-2022/from-glider")
+@click.argument("mission", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option(
+    "--cache",
+    "caches",
+    multiple=True,
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+    help="A folder of cache files (MISSION, and the folder `cache` in it or beside it).",
+)
+@click.option("--glider", help="Of several gliders in the folder, this one.")
+@click.option(
+    "--sensor",
+    default="temperature",
+    help="temperature, salinity, density, or the name of a science sensor (temperature).",
+)
+@click.option("--json", "as_json", is_flag=True, help="Segments and means as JSON.")
+def replay(mission: Path, caches: tuple[Path, ...], glider: str | None, sensor: str, as_json: bool) -> None:
+    """Fly the advised bands through the water that a mission recorded.
+
+    What is outside a band is not seen by its method. Coverage is the part of the gradient above a quarter of
+    its peak that the casts went through, travel their part of the way of full casts.
+    """
+    from gliderwatch.layers import flown
+    from gliderwatch.layers.constants import COUNTED
+
+    casts = _casts(mission, caches or _near(mission), glider, sensor)
+    found = flown.compare(casts, sensor)
+    if not found["full yos"]:
+        raise GliderwatchError(f"{mission} holds no segment with {COUNTED} casts of {sensor}")
+    totals = {name: flown.total(segments) for name, segments in found.items()}
+    if as_json:
+        means = {name: asdict(one) for name, one in totals.items()}
+        flights = {name: [asdict(one) for one in segments] for name, segments in found.items()}
+        click.echo(json.dumps({"means": means, "segments": flights}, indent=2))
+        return
+    click.echo(f"{'method':<32}{'coverage':>9}{'travel':>8}{'segments':>10}{'complete':>10}")
+    for name, one in totals.items():
+        click.echo(f"{name:<32}{one.coverage:>9.2f}{one.travel:>8.2f}{one.segments:>10}{one.complete:>10}")
+
+
+def _near(mission: Path) -> tuple[Path, ...]:
+    """Where cache files are, if nobody says it."""
+    return (mission, *(p for p in (mission / "cache", mission.parent / "cache") if p.is_dir()))
+
+
+def _casts(mission: Path, caches: Sequence[Path], glider: str | None, sensor: str) -> list[tuple[Cast, ...]]:
+    """The casts of each segment of one glider in a folder, in order of time; of copies the fullest."""
+    from gliderwatch.layers.casts import split
+    from gliderwatch.slocum import folders
+    from gliderwatch.slocum.decode import Decoder, decode_science
+
+    paths = sorted(path for path in mission.rglob("*") if folders.is_science(path.name))
+    best: dict[SegmentId, Segment] = {}
+    with Decoder(caches, decode=partial(decode_science, property_name=sensor)) as decoder:
+        for path, result in decoder.map(paths):
+            if not isinstance(result, Segment):
+                click.echo(f"{path.name} left out: {result}", err=True)
+            elif result.id not in best or best[result.id].completeness < result.completeness:
+                best[result.id] = result
+    gliders = {one.glider for one in best} if glider is None else {glider}
+    if len(gliders) > 1:
+        raise GliderwatchError(f"{mission} holds several gliders: --glider {' or '.join(sorted(gliders))}")
+    chosen = [best[one] for one in sorted(best) if one.glider in gliders]
+    return [split(one.get("science_depth"), one.get(f"science_{sensor}")) for one in chosen]
 
 
 def _summary(preset: Preset, run: Run) -> dict[str, Any]:

@@ -27,7 +27,7 @@ class Method(StrEnum):
 
 
 class Mode(StrEnum):
-    """``COMPLETE``: fly all depths; ``TRACK``: fly the band; ``RESET``: the layer was lost, fly all depths."""
+    """``COMPLETE``: fly all depths; ``TRACK``: fly the band; ``RESET``: the layer was lost, fly all."""
 
     COMPLETE = "complete"
     TRACK = "track"
@@ -41,18 +41,14 @@ class Band:
     top: float
     bottom: float
 
-    def includes(self, top: float, bottom: float) -> bool:
-        """Whether all between two depths (m) lies in it."""
-        return self.top <= top and bottom <= self.bottom
-
 
 @dataclass(frozen=True, slots=True)
 class Tracking:
     """What is known of the layers of a glider after a segment.
 
     ``mode`` and ``band`` are the advice for the next segment; the band is None where all depths are to be
-    flown. ``top`` and ``bottom`` (m) are the smoothed limits of the layers, ``peak`` (unit per m) the reference
-    of the gradient, ``complete_t`` (s) the end of the last segment of all depths, ``bin`` (m) and ``layers``
+    flown. ``top`` and ``bottom`` (m) are the smoothed limits of the layers, ``peak`` (unit per m) the
+    reference of the gradient, ``complete_t`` (s) the end of the last segment of all depths, ``bin`` (m) and ``layers``
     those of the last segment, ``why`` says in words why the mode is what it is.
     """
 
@@ -108,7 +104,7 @@ def _lost(before: Tracking, now: Tracking, found: Composite, last_t: float) -> s
     if before.band is not None and found.peak < c.LOST * before.peak:
         return f"its gradient fell to {found.peak / before.peak:.0%}"
     if before.band is not None and now.complete_t is not None and last_t - now.complete_t > c.LONGEST_TRACK:
-        return "no segment of all depths for a day"
+        return f"no segment of all depths for {c.LONGEST_TRACK / 3600:.0f} h"
     return ""
 
 

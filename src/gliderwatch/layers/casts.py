@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -38,9 +39,8 @@ class Cast:
 def split(depth: Series, value: Series) -> tuple[Cast, ...]:
     """The casts in samples of `depth` (m) and of a value; the depth is straight between its samples.
 
-    A turn is where the way goes back by `LEAST_CAST`, or by `LEAST_PART` of all depths: a glider that drifts at
-    depth makes no casts. Samples of the value before the first and after the last
-    depth are left out.
+    A turn is where the way goes back by `LEAST_CAST`, or by `LEAST_PART` of all depths: a glider that drifts
+    at depth makes no casts. Samples of the value before the first and after the last depth are left out.
     """
     if len(depth) < 2 or not len(value):
         return ()
@@ -49,7 +49,7 @@ def split(depth: Series, value: Series) -> tuple[Cast, ...]:
     casts = []
     least = max(LEAST_CAST, LEAST_PART * float(np.ptp(z))) if len(z) else LEAST_CAST
     turns = _turns(z, least)
-    for i, j in zip(turns[:-1], turns[1:], strict=True):
+    for i, j in pairwise(turns):
         if abs(z[j] - z[i]) >= least:
             part = slice(i, j + 1)
             casts.append(Cast(readonly(value.t[part]), readonly(z[part]), readonly(value.v[part])))

@@ -31,7 +31,7 @@ class Composite:
     @property
     def edges(self) -> Array:
         """Depths (m) between which the bins lie (n + 1,)."""
-        return self.top + self.bin * np.arange(len(self.gradient) + 1)
+        return readonly(self.top + self.bin * np.arange(len(self.gradient) + 1))
 
     @property
     def peak(self) -> float:
@@ -56,7 +56,7 @@ def composite(casts: Sequence[Cast], height: float) -> Composite:
     deepest = max((cast.bottom for cast in casts if len(cast.depth)), default=0.0)
     first = min((cast.top for cast in casts if len(cast.depth)), default=0.0)
     low, high = math.floor(first / height), math.ceil(deepest / height)
-    edges = height * np.arange(low, high + 1)
+    edges = readonly(height * np.arange(low, high + 1))
     each = np.array([_gradients(cast, edges) for cast in casts]).reshape(len(casts), max(len(edges) - 1, 0))
     n = np.isfinite(each).sum(axis=0)
     gradient, error = np.full(each.shape[1], np.nan), np.full(each.shape[1], np.nan)
@@ -93,7 +93,7 @@ def in_layer(found: Composite, property_name: str) -> NDArray[np.bool_]:
         least = np.fmax(max(PART_OF_PEAK * found.peak, FLOORS.get(property_name, 0.0)), ERRORS * found.error)
         inside = np.abs(found.gradient) > least
     for i, j in runs(~inside):
-        if 0 < i and j < len(inside) and j - i <= BRIDGED:
+        if i > 0 and j < len(inside) and j - i <= BRIDGED:
             inside[i:j] = True
     return inside
 

@@ -33,17 +33,20 @@ LOST = 0.5
 """The layer is lost where its peak falls below this part of its reference, as in 004 (Fig. 3)."""
 LEAST_CONFIDENCE = 0.5
 """Below it the advice is not to track: of the casts not even half show the layer."""
-LONGEST_TRACK = 86400.0
-"""s: a complete segment at least so often; the mixed layer has a daily cycle."""
+LONGEST_TRACK = 129600.0
+"""s: a complete segment at least so often: at another hour of the day each time, for the mixed layer has a
+daily cycle. With a day, electa flew 0.02 more of the full way and saw no more."""
 STILL = 0.5
-"""Extensions: a band that would change by less at both ends stays as it is, so that advice does not flicker."""
+"""Extensions: a band that would change by less at both ends stays, so that advice does not flicker."""
 FILTER_Q, FILTER_R = 3e-5, 3e-2
-"""Q (1/m2) and R (1) of the filter over received samples: R by the noise of a gradient between two samples."""
+"""Q (1/m2) and R (1) of the filter over received samples: R by the noise between two samples."""
 LEAST_STEP = 0.2
 """m: z_min of 004 eq. (6), as in its Table 2."""
 SHIFT = 0.25
-"""1: part of (half a band)^2 times dJ/dz by which the band moves in a segment. Table 1 moves it by 0.02 a period."""
+"""1: part of (half a band)^2 times dJ/dz by which the band moves in a segment; in Table 1, 0.02 a period."""
 FULL_CASTS = 2
-"""Casts over all depths in each segment: down and up. They see what the band does not; with them resets are rare."""
+"""Casts over all depths in each segment, down and up: they see what the band does not."""
 PEAK_EXTENSION = 4.0
 """Bins: what the method that follows the peak adds; it has the travel of the published method with it."""
+COUNTED = 6
+"""Casts that a segment has to have to count in a comparison of methods: shorter ones are test dives."""

@@ -15,6 +15,7 @@ from gliderwatch.layers.band import Band, Method, Mode, Tracking, follow
 from gliderwatch.layers.casts import Cast, bin_of
 from gliderwatch.layers.composite import Composite, composite
 from gliderwatch.layers.constants import (
+    COUNTED,
     FULL_CASTS,
     LEAST_CASTS,
     LEAST_EXTENSION,
@@ -27,10 +28,21 @@ Advise = Callable[[Tracking, Sequence[Cast]], Tracking]
 
 
 @dataclass(frozen=True, slots=True)
+class Total:
+    """Means over segments: ``coverage`` and ``travel`` as in `Flown`; how many ``segments``, and how many of
+    them ``complete``, without a band."""
+
+    coverage: float
+    travel: float
+    segments: int
+    complete: int
+
+
+@dataclass(frozen=True, slots=True)
 class Flown:
-    """One segment: ``t`` (s) its begin, its ``mode`` and ``band`` (None: all depths), ``coverage`` the part of
-    the gradient above a quarter of its peak that its casts went through, ``travel`` its part of the way of full
-    casts."""
+    """One segment: ``t`` (s) its begin, its ``mode`` and ``band`` (None: all depths), ``coverage`` the part
+    of the gradient above a quarter of its peak that its casts went through, ``travel`` its part of the way of
+    full casts."""
 
     t: float
     mode: Mode
@@ -45,38 +57,38 @@ def fly(segments: Sequence[Sequence[Cast]], advise: Advise, full_casts: int = 0)
     for casts in segments:
         if len(casts) < LEAST_CASTS:
             continue
-        seen = list(casts)
-        if tracking.band is not None:
-            band = tracking.band
-            seen[full_casts:] = [cast.within(band.top, band.bottom) for cast in casts[full_casts:]]
-        truth = composite(casts, bin_of(casts))
-        way = sum(_height(cast) for cast in casts)
-        travel = sum(_height(cast) for cast in seen) / way
-        mode = tracking.mode
-        out.append(Flown(float(casts[0].t[0]), mode, tracking.band, _covered(truth, seen), travel))
+        bands = [tracking.band if i >= full_casts else None for i in range(len(casts))]
+        ways = [_way(cast, band) for cast, band in zip(casts, bands, strict=True)]
+        full_way = sum(cast.bottom - cast.top for cast in casts)
+        travel = sum(bottom - top for top, bottom in ways) / full_way
+        covered = _covered(composite(casts, bin_of(casts)), ways)
+        out.append(Flown(float(casts[0].t[0]), tracking.mode, tracking.band, covered, travel))
+        seen = [cast.within(*way) for cast, way in zip(casts, ways, strict=True)]
         tracking = advise(tracking, [cast for cast in seen if len(cast.depth) > 1])
     return out
 
 
-def _height(cast: Cast) -> float:
-    return cast.bottom - cast.top if len(cast.depth) else 0.0
+def _way(cast: Cast, band: Band | None) -> tuple[float, float]:
+    """The depths (m) between which a cast would have gone; no height where the band is out of reach."""
+    if band is None:
+        return cast.top, cast.bottom
+    top = max(cast.top, band.top)
+    return top, max(min(cast.bottom, band.bottom), top)
 
 
-def _covered(truth: Composite, seen: Sequence[Cast]) -> float:
+def _covered(truth: Composite, ways: Sequence[tuple[float, float]]) -> float:
     """The part of the gradient above a quarter of its peak that the casts went through, any of them."""
     with np.errstate(invalid="ignore"):
         weight = np.where(np.abs(truth.gradient) > PART_OF_PEAK * truth.peak, np.abs(truth.gradient), 0.0)
     if not weight.any():
         return 1.0
-    went = np.max([_seen(truth.edges, cast) for cast in seen], axis=0)
+    went = np.max([_seen(truth.edges, *way) for way in ways], axis=0)
     return float(went @ weight / weight.sum())
 
 
-def _seen(edges: Array, cast: Cast) -> Array:
-    """1 for each bin between `edges` (m) of which a cast went through half at least, else 0."""
-    if not len(cast.depth):
-        return np.zeros(len(edges) - 1)
-    inside = np.minimum(edges[1:], cast.bottom) - np.maximum(edges[:-1], cast.top)
+def _seen(edges: Array, top: float, bottom: float) -> Array:
+    """1 for each bin between `edges` (m) of which half at least lies between two depths (m), else 0."""
+    inside = np.minimum(edges[1:], bottom) - np.maximum(edges[:-1], top)
     return np.asarray(inside >= np.diff(edges) / 2, dtype=float)
 
 
@@ -94,7 +106,8 @@ def kept(before: Tracking, casts: Sequence[Cast], property_name: str) -> Trackin
 
 
 def peak(before: Tracking, casts: Sequence[Cast]) -> Tracking:
-    """The depth of the largest gradient of the last cast, `PEAK_EXTENSION` bins up and down (Zhang et al., 2012)."""
+    """The depth of the largest gradient of the last cast, `PEAK_EXTENSION` bins up and down (Zhang et al.,
+    2012)."""
     if not casts:
         return before
     found = composite([casts[-1]] * LEAST_CASTS, bin_of(casts))
@@ -106,8 +119,8 @@ def peak(before: Tracking, casts: Sequence[Cast]) -> Tracking:
 
 
 def threshold(before: Tracking, casts: Sequence[Cast]) -> Tracking:
-    """From the first to the last depth of the last cast where the gradient is above a threshold that is set once,
-    a quarter of the peak of the first segment; extended by a bin (Feng et al., 2021)."""
+    """From the first to the last depth of the last cast where the gradient is above a threshold that is set
+    once, a quarter of the peak of the first segment; extended by a bin (Feng et al., 2021)."""
     if not casts:
         return before
     height = bin_of(casts)
@@ -138,3 +151,15 @@ def methods(property_name: str) -> dict[str, tuple[Advise, int]]:
         "composite": (by_composite, 0),
         "composite, two full casts": (by_composite, FULL_CASTS),
     }
+
+
+def compare(segments: Sequence[Sequence[Cast]], property_name: str) -> dict[str, list[Flown]]:
+    """All methods through the same water: the segments that have `COUNTED` casts."""
+    long = [casts for casts in segments if len(casts) >= COUNTED]
+    return {name: fly(long, advise, n) for name, (advise, n) in methods(property_name).items()}
+
+
+def total(flown: Sequence[Flown]) -> Total:
+    """The means of what was flown; at least one segment."""
+    coverage, travel = (float(np.mean([getattr(f, name) for f in flown])) for name in ("coverage", "travel"))
+    return Total(coverage, travel, len(flown), sum(f.band is None for f in flown))

@@ -36,7 +36,7 @@ Samples = Mapping[str, Series]
 _VOLUMES = ("ballast", "oil_volume")
 _KEPT = ("pitch", "roll", "depth", "speed_onboard", "dr_state", "dr_time", "thruster_on", "vacuum", *_VOLUMES)
 _PAIRS = (("fix_lat", "fix_lon"), ("dr_lat", "dr_lon"))
-_EXACT = ("fix_", "current_")
+_EXACT = ("fix_", "current_", "science_")
 """Beginnings of the names of quantities of which every value matters."""
 _FIRST = ("dr_", "waypoint_", "gps_status", "inflections")
 """Of those that jump, the first in each bin is kept: a mean would be a value that never was."""

@@ -38,7 +38,7 @@ from gliderwatch.slocum import folders
 from gliderwatch.slocum.caches import Scratch, Staging, checksum
 from gliderwatch.slocum.cycles import Sensors, intact, parse_sensor_list
 from gliderwatch.slocum.header import Header, parse_header, plain, read_regular
-from gliderwatch.slocum.science import science_files
+from gliderwatch.slocum.science import SCIENCE_TIME, science_files, sensors_of, water
 from gliderwatch.slocum.sensors import PRESSURES, SENSORS, TIME, Samples, build_segment, tells_depth
 
 # ----------------------------------------
@@ -123,7 +123,6 @@ def _to_array(kind: Any, value: Any) -> Any:
 # finds compressed files and cache files whatever their names.
 
 _LARGEST = 512 * 1024 * 1024
-_SCIENCE_TIME = "sci_m_present_time"
 _staging = cache(Staging)
 
 
@@ -166,12 +165,31 @@ def _science(path: Path, header: Header, cache_folders: Sequence[Path]) -> _Cont
     """
     for beside in science_files(path):
         try:
-            found = _content(beside, cache_folders, _SCIENCE_TIME, PRESSURES[-1:], science=True)
+            found = _content(beside, cache_folders, SCIENCE_TIME, PRESSURES[-1:], science=True)
         except (GliderwatchError, OSError):
             continue
         if found.header.id.name == header.id.name and tells_depth(found.samples):
             return found
     return None
+
+
+def decode_science(path: Path, cache_folders: Sequence[Path], property_name: str) -> Segment:
+    """What the science file at `path` holds of a property of the water (`science.sensors_of`), with its
+    depth, as quantities of its segment; none where it holds no such sensor. Raises as `decode`."""
+    try:
+        content = _content(path, cache_folders, SCIENCE_TIME, sensors_of(property_name), science=True)
+    except OSError as error:
+        raise Retry(f"cannot be read: {error}") from error
+    header, quantities = content.header, water(content.samples, property_name)
+    return Segment(
+        id=header.id,
+        mission=header.mission,
+        kind=header.kind,
+        last_t=max((float(series.t[-1]) for series in quantities.values()), default=header.id.opened_at),
+        completeness=(folders.rank(header.kind), content.n_cycles, content.digest.hexdigest()),
+        quantities=quantities,
+        dropped={"bytes": content.damaged} if content.damaged else {},
+    )
 
 
 def _content(
