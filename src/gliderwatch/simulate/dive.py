@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import asin, atan2, cos, hypot, sin
+from math import asin, atan2, cos, hypot, sin, tan
 from typing import NamedTuple
 
 import gsw
@@ -10,8 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gliderwatch.model import Array
-from gliderwatch.simulate.flight import Vector, along_heading, displacement, nmea, offset, own_speed, turn
-from gliderwatch.simulate.scenario import DiveTruth
+from gliderwatch.simulate.flight import (
+    Vector,
+    along_heading,
+    displacement,
+    nmea,
+    offset,
+    own_speed,
+    steady_glide,
+    turn,
+)
+from gliderwatch.simulate.scenario import DiveTruth, Scenario
 from gliderwatch.simulate.telemetry import CYCLE, SCIENCE_CYCLE
 from gliderwatch.simulate.vehicle import NODE, Flown, Glider, Motion, fly
 
@@ -254,7 +263,7 @@ def dive(glider: Glider, segment: str) -> Flown:
     t = glider.times(start + np.arange(n))
     depth = np.clip(motion.depth + _DEPTH_NOISE * rng.standard_normal(n), 0.0, None)
     pitch = motion.pitch + _PITCH_NOISE * rng.standard_normal(n)
-    believed = own_speed(depth, pitch, CYCLE)
+    believed = own_speed(depth, pitch, CYCLE) * _allowance(scenario)
     course = steer(glider, believed)
     kept = np.interp(np.arange(n), NODE * np.arange(len(course.kept)), np.unwrap(course.kept))
     compass = kept + scenario.variation + _COMPASS_NOISE * rng.standard_normal(n)
@@ -270,6 +279,14 @@ def dive(glider: Glider, segment: str) -> Flown:
     glider.move(end, float(east[-1] + far_east[-1]), float(north[-1] + far_north[-1]))
     truth = _truth(glider, segment, (start, end), motion, float(believed.mean()), through, current)
     return Flown(start, end, Vector(float(reckoning.east[-1]), float(reckoning.north[-1])), truth)
+
+
+def _allowance(scenario: Scenario) -> float:
+    """The part of depth rate over tan(pitch) that the glider takes for its speed."""
+    if not scenario.allowed:
+        return 1.0
+    glide = steady_glide(scenario.pitch, scenario.drive, scenario.airframe)
+    return 1 - scenario.allowed * (1 - tan(scenario.pitch) * glide.horizontal / glide.vertical)
 
 
 def _truth(
