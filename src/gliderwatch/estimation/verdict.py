@@ -132,8 +132,8 @@ def _left(shape: Array, across: Array, sigma: Array) -> float:
 # Flag 2: a measurement is wrong. Flag 1: the glider is slower than normal (or faster than configured), at
 # once or by evidence over several dives. No flag: its speed cannot be known from this dive, and why.
 
-DIVES_A_MONTH = 240.0
-"""Dives of 3 h in 30 days."""
+DIVES_A_MONTH, USUAL_DIVE = 240.0, 3 * 3600.0
+"""Dives of 3 h in 30 days, and that time in s: of shorter dives each counts for less."""
 DEPARTURE, SLACK = 0.08, 1.0
 """Part of the usual speed by which a healthy glider's speed varies at least, for the sum of small losses;
 and how many times that does not add to the sum."""
@@ -402,7 +402,9 @@ def _small_losses(
     found = info.estimate
     # a dive that hardly tells the speed adds little, and no dive alone is several
     departure = (1 - found.speed / normal.usual) / max(DEPARTURE, found.own_sigma / normal.usual)
-    total = min(cusum(state.slow, min(departure, bound / 2 + SLACK), SLACK), bound + SLACK)
+    part = min((info.seen.end - info.seen.start) / USUAL_DIVE, 1.0)
+    departure = min(departure, bound / 2 + SLACK)
+    total = min(cusum(state.slow, part * departure, part * SLACK), bound + SLACK)
     if departure < SLACK / 2:
         total /= 2  # it flies as usual: what was slow is over soon
     state = replace(state, slow=total)
