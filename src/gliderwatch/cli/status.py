@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gliderwatch.cli.manage import reading, writing
-from gliderwatch.config import Config, Link, linked_gliders
+from gliderwatch.config import Config, linked_gliders
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.incidents.acknowledgement import Ack, Acks, acknowledge, with_mute
 from gliderwatch.incidents.constants import GONE, RECENT
@@ -21,6 +21,7 @@ from gliderwatch.params import Attention
 from gliderwatch.service.jsonl import assessment_line, iso
 from gliderwatch.service.liveness import STALE, is_held, seconds_silent
 from gliderwatch.service.routing import withdraw_answered
+from gliderwatch.slocum.folders import Link
 from gliderwatch.store.state_file import File, Status, Store, Undelivered
 
 # ----------------------------------------
@@ -63,7 +64,9 @@ def _of(store: Store, glider: str, every: bool) -> list[IncidentEntry]:
     return [IncidentEntry(i, acks.get(i.id)) for i in found]
 
 
-def ack(config: Config, identity: str, by: str, note: str, now: float) -> tuple[IncidentEntry, bool]:
+def acknowledge_incident(
+    config: Config, identity: str, by: str, note: str, now: float
+) -> tuple[IncidentEntry, bool]:
     """Take an open incident on; with it, and whether that is new: the same once more changes nothing.
 
     Who waits for an acknowledgement is not told of it any more.

@@ -103,7 +103,7 @@ class Runtime:
     config: Config
     news: SimpleQueue[News]
     workers: int
-    speaking: Routing
+    routing: Routing
     settling: Settling
     watcher: Watcher
     decoder: Decoder
@@ -169,7 +169,7 @@ def build(
         config.dockserver.observer,
         logs=config.dockserver.logs,
     )
-    ocean, speaks = OceanCache(config), routing_of(config)
+    ocean, routing = OceanCache(config), routing_of(config)
     lists = SensorLists(lists_folder(Path(config.state.path)))
     # shared: what follows can no longer refuse the configuration
     decoder = Decoder((), max_workers=workers) if before is None else before.decoder
@@ -177,7 +177,7 @@ def build(
         config,
         news,
         workers,
-        speaks,
+        routing,
         Settling(config.dockserver.settle_seconds),
         watcher,
         decoder,

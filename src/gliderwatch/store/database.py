@@ -280,7 +280,7 @@ def guarded(path: Path | str) -> Iterator[None]:
     except (sqlite3.IntegrityError, sqlite3.ProgrammingError, sqlite3.DataError, sqlite3.NotSupportedError):
         raise
     except sqlite3.Error as error:
-        raise _told(path, error) from error
+        raise _state_error(path, error) from error
 
 
 def primary(error: sqlite3.Error) -> int:
@@ -289,7 +289,7 @@ def primary(error: sqlite3.Error) -> int:
     return code & 0xFF
 
 
-def _told(path: Path | str, error: sqlite3.Error) -> StateError:
+def _state_error(path: Path | str, error: sqlite3.Error) -> StateError:
     if primary(error) in DAMAGE:
         return DamagedError(f"state file {path} is damaged: {error}")
     cure = _CURES.get(primary(error))
