@@ -236,7 +236,7 @@ def main() -> None:
     parser.add_argument("--seas", nargs="*", choices=list(SEAS), help="these kinds of sea alone")
     parser.add_argument("--only", nargs="*", choices=[HEALTHY, *FAULTS], help="these faults alone")
     parser.add_argument("--seeds", type=int, help="gliders a sea (6; quick: 2)")
-    parser.add_argument("--first", type=int, default=0, help="seed of the first: others than those calibrated with")
+    parser.add_argument("--first", type=int, default=0, help="first seed: others than were calibrated with")
     parser.add_argument("--days", type=float, default=30.0, help="of healthy gliders")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--direct", action="store_true", help="write no checkpoints: half of the time")

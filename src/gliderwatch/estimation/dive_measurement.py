@@ -163,7 +163,7 @@ def _not_logged(dive: Dive, dt: Array) -> float:
         return 0.0
     usual = median(dt.tolist())
     gaps = (dive.t_dive - dive.start.t, dive.end.t - dive.t_surface)
-    return sum(min(max(gap, 0.0), usual) / 2 for gap in gaps)
+    return float(sum(min(max(gap, 0.0), usual) / 2 for gap in gaps))
 
 
 def are_apart(end: Fix, start: Fix) -> bool:

@@ -41,8 +41,8 @@ SEA, DOUBT = (0.1, 40.0), (0.02, 9.0)
 is 0.6 cm/s before anything is learnt; on the real missions at hand it is about that, and a tenth of it where
 compass, pitch and fixes are as good as simulated ones."""
 LEAST_DOUBT = 0.25
-"""What the tests take the factor on the measurements for, at least: data that were better than usual until now
-do not make a fault of the first dive that is as usual."""
+"""What the tests take the factor on the measurements for, at least: data that were better than usual until
+now do not make a fault of the first dive that is as usual."""
 
 
 def learn_process_scale(factor: float, square: float | None, share: float, dives: int) -> float:

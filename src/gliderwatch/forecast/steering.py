@@ -25,9 +25,9 @@ class Plan:
     """What a glider knows of its way at a surfacing.
 
     ``heading`` ((2,), mean vector of the last dive), ``bearing`` (rad, counter-clockwise from east, None: not
-    known) of the waypoint of that dive at its start, or of the course that it steered, ``length`` of the mean heading vector on a straight
-    way; ``current`` (m/s, (2,)) and ``speed`` (m/s) it reckons with; ``goals`` (m, (2,)) from the fix: the
-    waypoint and the one after it, as far as known.
+    known) of the waypoint of that dive at its start, or of the course that it steered, ``length`` of the mean
+    heading vector on a straight way; ``current`` (m/s, (2,)) and ``speed`` (m/s) it reckons with; ``goals``
+    (m, (2,)) from the fix: the waypoint and the one after it, as far as known.
     """
 
     heading: Array

@@ -12,7 +12,7 @@ part of depth-averaged currents 4 to 8 cm/s a component in the open sea, more on
 Water that is denser or lighter makes the speed of healthy gliders wander by 1 to 4 % (on real missions it
 changes by 0.3 to 1.5 cm/s from dive to dive).
 No two gliders are alike: drag and lift of the airframe differ by 10 and 5 %, and on board nothing to half of
-the loss by the angle of attack is allowed for, so that a depth-averaged current is 5 to 10 % of the speed off.
+the loss by the angle of attack is allowed for: a depth-averaged current is 5 to 10 % of the speed off.
 Inertial motion has the period of M2 at 74.5 degrees of latitude, of K1 at 30.
 """
 
