@@ -146,6 +146,7 @@ three to one."""
 FASTER = "faster than ever: the current is wrong, or it is driven harder"
 NEW_FASTER = "faster than before: a new way of flying, or the current is wrong: the next dives will tell"
 NEW_SLOWER = "slower than before, after a change of pitch or ballast: the next dives will tell"
+NEW_WAY = "flies in a new way for three dives: "
 HIDDEN = 0.1
 """Part of the speed that the glider believes, by which it must be slower to be slower than that."""
 ROLLED, ROLLS = 0.12, 5
@@ -210,13 +211,15 @@ class SpeedState:
 class Verdict:
     """What a dive says: ``flag`` (None: nothing) with the ``reason`` in words, the ``normal`` range used, and
     what was found (``info``, None: the dive has no track). ``by_reckoning``: the speed through the water
-    (m/s) and its standard error by depth rate and pitch, where these alone decided."""
+    (m/s) and its standard error by depth rate and pitch, where these alone decided. ``before``: what was the
+    usual speed (m/s) until this dive made another one normal."""
 
     flag: Flag | None
     reason: str
     normal: SpeedRange
     info: JointInfo | None
     by_reckoning: tuple[float, float] | None = None
+    before: float | None = None
 
 
 def step(
@@ -251,10 +254,12 @@ def step(
         if flag is not None and told is not None:
             left = 1 - _usual_slip(params)
             return state, Verdict(flag, reason, normal, info, (told.speed * left, told.sigma * left))
+    known = normal
     state, flag, reason, normal = _regime(state, dive, info, told, normal, flag, reason, params)
+    before = known.usual if reason.startswith(NEW_WAY) else None
     if flag is Flag.NORMAL and not frozen:
         state = replace(_learnt(state, dive, info, at, params), trim=_trim(dive))
-    return state, Verdict(flag, reason, normal, info)
+    return state, Verdict(flag, reason, normal, info, before=before)
 
 
 def _regime(
@@ -286,8 +291,7 @@ def _regime(
     at = setting(dive.features)
     state = replace(state, normal=renewed(state.normal, row, at), other=(), slow=0.0, doubted=0)
     new = speed_range(state.normal, at, learning) or normal
-    words = f"flies in a new way for three dives: {speed:.2f} m/s is its normal speed now, "
-    words += "unless you say otherwise"
+    words = f"{NEW_WAY}{speed:.2f} m/s is its normal speed now, unless you say otherwise"
     return state, Flag.NORMAL, words, new
 
 

@@ -67,7 +67,8 @@ class Surfacings:
     seen yet), ``lengths`` those of the last ones; ``speed`` (m/s) that the glider believes; ``current``
     (m/s) of the last dive, ``change`` ((m/s)2, a component) the mean square of its changes;
     ``bearing`` (rad) of the waypoint when that dive began, else of the course that it steered.
-    ``waypoints`` in order, the present one last; ``scores`` of the ways of steering, mean square errors of their courses; ``misses``, see `factor`.
+    ``waypoints`` in order, the present one last; ``scores`` of the ways of steering, mean square errors of
+    their courses; ``misses``, see `factor`.
     """
 
     fix: Fix | None = None

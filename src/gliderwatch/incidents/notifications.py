@@ -12,11 +12,11 @@ from typing import Protocol
 from gliderwatch.incidents.aborts import Episode
 from gliderwatch.incidents.acknowledgement import Acks
 from gliderwatch.incidents.calls import Empty
-from gliderwatch.incidents.constants import FLOW_CHANGE, MARKS, NEWS, SLACK, SPEED_CHANGE, WEEK
+from gliderwatch.incidents.constants import FLOW_CHANGE, MARKS, NEWS, REGIME_DIVES, SLACK, SPEED_CHANGE, WEEK
 from gliderwatch.incidents.overdue import Silence
 from gliderwatch.incidents.unjudged import Unknown
 from gliderwatch.messages import incident_text
-from gliderwatch.model import Alert, Assessment, Incident, NextSurfacing
+from gliderwatch.model import Alert, Assessment, Incident, NextSurfacing, Severity
 
 # ----------------------------------------
 # What people have been told, compared with what is known: the messages that are due. Pure.
@@ -48,7 +48,7 @@ class NotificationState:
         ``surfaced`` is the surfacing of the last notice (s), ``silences`` what was sent of its staying away
     (`incidents.overdue`), ``unknown`` of dives that could not be judged (`incidents.unjudged`), ``aborts`` of
     aborts (`incidents.aborts`), ``empty`` of calls without a file (`incidents.calls`), ``irregularities`` the
-    ids of those of its files.
+    ids of those of its files, ``renewed`` the dive (s) of the last notice of a new way of flying.
     """
 
     threads: tuple[Thread, ...] = ()
@@ -58,6 +58,7 @@ class NotificationState:
     aborts: tuple[Episode, ...] = ()
     empty: Empty | None = None
     irregularities: tuple[str, ...] = ()
+    renewed: float | None = None
 
 
 class IncidentFacts(Protocol):
@@ -107,6 +108,8 @@ def due_notifications(
             thread, more = _begun(incident, known, latest, {t.id for t in threads})
             threads.append(thread)
             alerts += more
+    renewed, more = _new_regime(said.renewed, known, latest)
+    alerts += more
     surfaced = said.surfaced
     if notices and _is_another(latest, surfaced):
         identity = f"{latest.glider}/surfacing/{latest.t_dive:.0f}"
@@ -117,8 +120,35 @@ def due_notifications(
             expected = None  # of an earlier surfacing: the last dive cannot be used
         alerts.append(incident_text.surfacing(latest, previous, alert_id=identity, expected=expected))
         surfaced = latest.t_surface
-    said = replace(said, threads=tuple(threads), surfaced=surfaced)
+    said = replace(said, threads=tuple(threads), surfaced=surfaced, renewed=renewed)
     return said, sorted(alerts, key=lambda a: a.time)
+
+
+def _new_regime(
+    renewed: float | None, known: IncidentFacts, latest: Assessment
+) -> tuple[float | None, list[Alert]]:
+    """The dive (s) whose new way of flying people were told of, and the notice of one that is news.
+
+    Files may have come together: it is looked for among the last `REGIME_DIVES`.
+    """
+    dives = [latest]
+    for _ in range(REGIME_DIVES):
+        earlier = known.last_surfacing(dives[-1].t_surface - 1.0)
+        if earlier is None:
+            break
+        dives.append(earlier)
+    for k, dive in enumerate(dives):
+        before = dive.evidence.get("usual_before")
+        if renewed is not None and dive.t_dive <= renewed:
+            break
+        if before is not None and dive.speed is not None and latest.t_surface - dive.t_surface < NEWS:
+            since = dives[min(k + 2, len(dives) - 1)].t_dive
+            identity = f"{dive.glider}/regime/{dive.t_dive:.0f}"
+            alert = incident_text.new_regime(
+                dive, before, since, alert_id=identity, audience=Severity.WARNING
+            )
+            return dive.t_dive, [alert]
+    return renewed, []
 
 
 def unacknowledged(said: NotificationState, incidents: tuple[Incident, ...], acks: Acks) -> frozenset[str]:
@@ -164,7 +194,7 @@ def as_notified(said: NotificationState, known: IncidentFacts) -> NotificationSt
     for i in incidents:
         if i.id not in old and i.cleared_at is not None and _is_news(i, latest):
             threads.append(Thread(i.id, i, i.last, 0, latest.t_surface))
-    return replace(said, threads=tuple(threads))
+    return replace(said, threads=tuple(threads), renewed=latest.t_dive)
 
 
 def _is_acknowledged(thread: Thread, now: Incident, acks: Acks) -> bool:

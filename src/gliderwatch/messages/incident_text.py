@@ -191,6 +191,36 @@ def surfacing(
     )
 
 
+def new_regime(
+    assessment: Assessment, before: float, since: float, *, alert_id: str, audience: Severity
+) -> Alert:
+    """The glider is flown in a new way: three dives since ``since`` (s) agree on a speed that is normal from
+    now on, and ``before`` (m/s) was."""
+    a = assessment
+    assert a.speed is not None
+    what = "faster" if a.speed > before else "slower"
+    normal = f"{a.speed_min:.2f} to {a.speed_max:.2f} m/s"
+    why = "A thruster, ballast or pitch does that" if what == "faster" else "Pitch or ballast changed as well"
+    lead = f"{_glider(a)} flies {what} since {utc(since)}: {a.speed:.2f} m/s, {before:.2f} m/s before."
+    page = Page(
+        (lead, f"New normal range: {normal}, unless you say otherwise."),
+        (("Since", utc(since)), *_facts(a, 0)),
+        (
+            (
+                "Check",
+                (
+                    f"{why}; if it was not you, see what is wrong.",
+                    "To say otherwise, set normal_speed for this glider in the configuration.",
+                ),
+            ),
+        ),
+    )
+    title = f"NEW NORMAL {_glider(a)}: flies {what}, {a.speed:.2f} m/s (now normal: {normal})"
+    return _alert(
+        a, a.t_surface, Kind.REGIME, title, page, severity=Severity.INFO, alert_id=alert_id, audience=audience
+    )
+
+
 def operator(
     title: str,
     text: str,

@@ -182,6 +182,11 @@ def _surfacing(now: float) -> Alert:
     return incident_text.surfacing(dive, now - 4 * _HOUR, alert_id="", expected=expected)
 
 
+def _regime(now: float) -> Alert:
+    dive = replace(_at(_HEALTHY, now), speed=0.49, speed_min=0.42, speed_max=0.66)
+    return incident_text.new_regime(dive, 0.29, now - 10 * _HOUR, alert_id="", audience=Severity.WARNING)
+
+
 def _operator(now: float) -> Alert:
     return incident_text.operator(
         "no file of any glider for 26.0 h",
@@ -203,6 +208,7 @@ SAMPLES: dict[Kind, Callable[[float], Alert]] = {
     Kind.ALL_CLEAR: _all_clear,
     Kind.REMINDER: _reminder,
     Kind.CORRECTION: _correction,
+    Kind.REGIME: _regime,
     Kind.SURFACING: _surfacing,
     Kind.OPERATOR: _operator,
 }
