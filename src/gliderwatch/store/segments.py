@@ -1,17 +1,156 @@
-"""The segments of each glider in a state file, and the checkpoints after them."""
+"""The segments of each glider in a state file, on the right clock, and the checkpoints after them."""
 
 from __future__ import annotations
 
 import sqlite3
 import zlib
+from collections.abc import Sequence
 from dataclasses import replace
 
 from gliderwatch.model import Segment, SegmentId
-from gliderwatch.navigation.clock import SAME_OPENING, Correction, moved, numbered
-from gliderwatch.navigation.samples import downsample
+from gliderwatch.navigation.clock import (
+    SAME_OPENING,
+    ClockStep,
+    Correction,
+    MissionClock,
+    Stamp,
+    corrections,
+    mission_clock,
+    moved,
+    numbered,
+)
+from gliderwatch.navigation.flight import downsample
 from gliderwatch.pipeline import GliderState
-from gliderwatch.store import clocks, codec
-from gliderwatch.store.clocks import FIRST
+from gliderwatch.store import codec
+
+# ----------------------------------------
+# The clocks of gliders in a state file: segments get their right place in time (`navigation.clock`).
+
+FIRST = 2
+"""`milestone` of a segment before which nothing is kept any more."""
+_COLUMNS = "name, opened_at, clock_offset, clock_step, last_t, milestone"
+_OF_MISSION = "glider = ? AND name >= ? AND name < ?"
+
+
+def _names(mission: str) -> tuple[str, str]:
+    """The names of the segments of a mission lie between these: "." is the character after "-"."""
+    return f"{mission}-", f"{mission}."
+
+
+class MissionClocks:
+    """The clock of each mission that was looked at, in memory, so that the next segment costs no look at all
+    segments before it. What only the whole mission can tell is looked up there."""
+
+    def __init__(self, connection: sqlite3.Connection) -> None:
+        self._db = connection
+        self._clocks: dict[tuple[str, str], MissionClock] = {}
+
+    def clear(self) -> None:
+        """Know nothing: what is in the state file is another than it was."""
+        self._clocks.clear()
+
+    def correct(self, glider: str, name: str, stamp: Stamp) -> dict[SegmentId, SegmentId]:
+        """Put the segments of a mission where they belong in time, after one was put there under this name;
+        the ids before and after of those moved."""
+        mission = numbered(name)[0]
+        clock = self._clocks.get((glider, mission))
+        new = None if clock is None else clock.next(stamp)
+        if clock is None or new is None:
+            return self._correct_all(glider, mission)
+        self._clocks[glider, mission] = replace(clock, newest=stamp, offset=new.offset)
+        if new == Correction():
+            return {}
+        before = SegmentId(stamp.opened_at, glider, name)
+        after = replace(before, opened_at=stamp.opened_at + new.offset)
+        _move(self._db, before, after, new)
+        return {before: after}
+
+    def _correct_all(self, glider: str, mission: str) -> dict[SegmentId, SegmentId]:
+        rows = _rows(self._db, glider, mission)
+        stamps = [_stamp(row) for row in rows]
+        found = corrections(stamps, _start(rows))
+        self._clocks.pop((glider, mission), None)
+        if (clock := mission_clock(stamps, found)) is not None:
+            self._clocks[glider, mission] = clock
+        moves = {}
+        for row, stamp, new in zip(rows, stamps, found, strict=True):
+            if new == _correction(row):
+                continue
+            before = SegmentId(row["opened_at"], glider, row["name"])
+            after = SegmentId(stamp.opened_at + new.offset, glider, row["name"])
+            _move(self._db, before, after, new)
+            moves[before] = after
+        return moves
+
+    def offset(self, identity: SegmentId) -> float:
+        """What would be added to the time of a segment (s) if it came now; by the glider's clock."""
+        mission, number = numbered(identity.name)
+        own = Stamp(number, identity.opened_at, identity.opened_at)
+        clock = self._clocks.get((identity.glider, mission))
+        if clock is not None and (found := clock.next(own)) is not None:
+            return found.offset
+        rows = [row for row in _rows(self._db, identity.glider, mission) if row["name"] != identity.name]
+        return corrections([own, *map(_stamp, rows)], _start(rows))[0].offset
+
+
+def _rows(db: sqlite3.Connection, glider: str, mission: str) -> list[sqlite3.Row]:
+    """The segments of a mission in the order of their numbers."""
+    sql = f"SELECT {_COLUMNS} FROM segments WHERE {_OF_MISSION}"
+    rows = db.execute(sql, (glider, *_names(mission))).fetchall()
+    return sorted(rows, key=lambda row: numbered(row["name"])[1])
+
+
+def _stamp(row: sqlite3.Row) -> Stamp:
+    return Stamp(numbered(row["name"])[1], row["opened_at"] - row["clock_offset"], row["last_t"])
+
+
+def _correction(row: sqlite3.Row) -> Correction:
+    return Correction(row["clock_offset"], row["clock_step"])
+
+
+def _start(rows: Sequence[sqlite3.Row]) -> Correction:
+    """What was known at the first segment, where `state.keep_days` has removed those before it."""
+    return _correction(rows[0]) if rows and rows[0]["milestone"] == FIRST else Correction()
+
+
+def _move(db: sqlite3.Connection, before: SegmentId, after: SegmentId, correction: Correction) -> None:
+    """Give a segment its place in time, and its sign of life with it."""
+    key = (before.glider, before.opened_at, before.name)
+    db.execute(
+        "UPDATE segments SET opened_at = ?, clock_offset = ?, clock_step = ?, checkpoint = NULL "
+        "WHERE glider = ? AND opened_at = ? AND name = ?",
+        (after.opened_at, correction.offset, correction.step, *key),
+    )
+    db.execute(
+        "UPDATE heard SET opened_at = opened_at - clock_offset + ?1, last_t = last_t - clock_offset + ?1, "
+        "clock_offset = ?1 WHERE glider = ?2 AND segment = ?3 AND abs(opened_at - ?4) <= ?5",
+        (correction.offset, before.glider, before.name, before.opened_at, SAME_OPENING),
+    )
+    db.execute("DELETE FROM expected WHERE glider = ? AND opened_at = ? AND segment = ?", key)
+
+
+def steps(db: sqlite3.Connection, glider: str) -> list[ClockStep]:
+    """Where the clock of a glider was set back, or is right again, in order of time.
+
+    The right time of one that is not corrected is not known: that of the newest segment of its mission stands
+    for it.
+    """
+    rows = db.execute(
+        "SELECT name, opened_at, clock_offset, clock_step FROM segments WHERE glider = ? AND clock_step != 0",
+        (glider,),
+    )
+    found = [ClockStep(glider, *row) for row in rows]
+    newest = f"SELECT max(opened_at) FROM segments WHERE {_OF_MISSION}"
+    for i, step in enumerate(found):
+        if not step.is_corrected:
+            mission = numbered(step.segment)[0]
+            t = db.execute(newest, (glider, *_names(mission))).fetchone()[0]
+            found[i] = replace(step, t=t)
+    return sorted(found, key=lambda step: step.t)
+
+
+# ----------------------------------------
+# The segments of each glider in a state file, and the checkpoints after them.
 
 # ----------------------------------------
 # States of gliders that are ahead of their checkpoints: while a long list of files is taken in.
@@ -65,13 +204,14 @@ SPARSE = 16
 class Segments:
     """The segments in a state file, on the connection of its store.
 
-    ``following`` counts the files of the glider that are at hand behind the one that is taken in; ``ahead``
-    has the states that are not written for it.
+    ``following`` counts the files of the glider that are at hand behind the one that is processed; ``ahead``
+    has the states that are not written for it, ``clocks`` the clocks of missions.
     """
 
     def __init__(self, connection: sqlite3.Connection) -> None:
         self._db = connection
         self.ahead, self.following = CheckpointCache(), 0
+        self.clocks = MissionClocks(connection)
 
     def completeness(self, identity: SegmentId) -> tuple[int, int, str] | None:
         """Of the copy of a segment that is held, None when there is none; by the glider's clock."""
@@ -107,6 +247,7 @@ class Segments:
             touched = [SegmentId(old["opened_at"], glider, name)]
             correction = Correction(old["clock_offset"], old["clock_step"])
             self._forget(touched[0])
+            self.clocks.clear()
         self._db.execute(
             "INSERT INTO segments VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, NULL)",
             (
@@ -121,7 +262,8 @@ class Segments:
                 codec.encode(thinned),
             ),
         )
-        moves = clocks.correct(self._db, glider, numbered(name)[0])
+        stamp = Stamp(numbered(name)[1], segment.id.opened_at, segment.last_t)
+        moves = self.clocks.correct(glider, name, stamp)
         here = SegmentId(segment.id.opened_at + correction.offset, glider, name)
         return min([moves.pop(here, here), *touched, *moves, *moves.values()])
 
