@@ -299,8 +299,8 @@ def test_readme_has_the_counts_of_the_table() -> None:
     default = {fault.partition(":")[0]: n for (fault, way), n in counted().items() if "learnt" in way}
     double = counted()["remora: drag times 2", "`joint`, learnt"]
     sentence = (
-        f"found {double[0]} remoras that double the drag, {default['wing lost'][0]} lost wings that roll, and "
-        f"called {default['none'][0]} healthy gliders faulty"
+        f"found {double[0]} remoras that double the drag, {default['wing lost'][0]} lost wings that roll, "
+        f"and called {default['none'][0]} healthy gliders faulty"
     )
     assert sentence in " ".join(text("README.md").split())
 
