@@ -22,8 +22,9 @@ INTRO = """\
 # Configuration
 
 One YAML file; copy `config/gliderwatch.yml`, which has comments. Before you start,
-`gliderwatch check -c FILE` names the line of each mistake, and checks the folders, caches and channels too. An editor with
-JSON Schema completes and checks the file with `gliderwatch.schema.json` of this folder.
+`gliderwatch check -c FILE` names the line of each mistake, and checks the folders, caches
+and channels too. An editor with JSON Schema completes and checks the file with
+`gliderwatch.schema.json` of this folder.
 
 *`docs/generate.py` makes this page.*
 
