@@ -50,7 +50,7 @@ class Config(Section):
     )
     channels: dict[Name, Channel] = Field(default_factory=dict, description="Ways to send messages.")
     recipients: dict[Name, Recipient] = Field(default_factory=dict, description="Who gets what.")
-    operator: Operator = Field(default=Operator(), description="When the operator is told.")
+    operator: Operator = Field(default=Operator(), description="When the operator gets a message.")
     heartbeat: Heartbeat = Field(default=Heartbeat(), description="For a dead man's switch.")
     metrics: Metrics = Field(default=Metrics(), description="For Prometheus.")
     _document: Document = PrivateAttr(Document(Path("configuration"), None, {}))

@@ -135,13 +135,13 @@ class FalseAlarm(Section):
 
 
 class Rules(Section):
-    """How flags become incidents, and how often an open one is brought to mind."""
+    """How flags become incidents, and how often reminders of an open one come."""
 
     anomaly: Anomaly = Field(default=Anomaly(), description="Flag 1.")
     false_alarm: FalseAlarm = Field(default=FalseAlarm(), description="Flag 2.")
     reminder_hours: Annotated[Number, Field(gt=0, le=8760)] | None = Field(
         default=_R.reminder_hours,
-        description="Hours until an open incident is brought to mind; again after 2, 4, 7, 14, ... times "
+        description="Hours until the reminder of an open incident; again after 2, 4, 7, 14, ... times "
         "that; null: none.",
     )
 
@@ -179,12 +179,12 @@ class Settings(Preset):
 
     unknown_hours: Annotated[Number, Field(gt=0, le=720)] | None = Field(
         default=_A.unknown_hours,
-        description="Hours without a dive that could be judged, although files come, after which that is "
-        "told (at least two intervals between surfacings); null: hours do not count.",
+        description="Hours without a dive that could be judged, although files come, after which a message "
+        "comes (at least two intervals between surfacings); null: hours do not count.",
     )
     unknown_dives: Count | None = Field(
         default=_A.unknown_dives,
-        description="Dives in a row that could not be judged after which that is told; null: their number "
+        description="Dives in a row without a judgement after which a message comes; null: their number "
         "does not count.",
     )
 
@@ -220,16 +220,16 @@ class Glider(Settings):
     )
     muted_until: Moment | None = Field(
         default=None,
-        description="Nothing is told of it until then; it is assessed all the same. A date (`2026-12-01`: "
-        "from 00:00 UTC on it is told of again) or a date and time in UTC (`2026-12-01 14:30`).",
+        description="No messages about it until then; it is still assessed. A date (`2026-12-01`: "
+        "messages from 00:00 UTC on) or a date and time in UTC (`2026-12-01 14:30`).",
     )
     recovered: Switch = Field(
-        default=False, description="It is out of the water: nothing is told of it, its silence least of all."
+        default=False, description="It is out of the water: no messages about it, and it is not overdue."
     )
 
 
 # ----------------------------------------
-# The sections of the settings that are of the service: where files come, who is told, how it is watched.
+# The sections of the settings that are of the service: where files come, who gets messages, its own watch.
 
 
 class Dockserver(Section):
@@ -330,28 +330,29 @@ class Metrics(Section):
 
 
 class Operator(Section):
-    """When those who run gliderwatch are told that the watch itself is in trouble."""
+    """When those who run gliderwatch get a message about a problem of the watch itself."""
 
     silent_hours: Annotated[Number, Field(gt=0, le=8760)] | None = Field(
         default=24.0,
         description="Hours without a file of any glider, or of one in the water while others call; "
-        "null: never told.",
+        "null: never.",
     )
     quarantined_per_day: Annotated[int, Field(strict=True, ge=1, le=100_000)] | None = Field(
         default=20,
-        description="More files of one glider than so many quarantined within 24 h; null: never told.",
+        description="More files of one glider than this quarantined within 24 h; null: never.",
     )
     waiting_hours: Annotated[Number, Field(gt=0, le=8760)] | None = Field(
         default=6.0,
-        description="Hours that files of a glider have waited (for a cache file, ...); null: never told.",
+        description="Hours that files of a glider have waited (for a cache file, ...); null: never.",
     )
     channel_hours: Annotated[Number, Field(gt=0, le=720)] | None = Field(
         default=1.0,
-        description="Hours that a channel has not delivered a message, told by the others; null: never told.",
+        description="Hours that a channel has not delivered a message (the other channels report it); "
+        "null: never.",
     )
     free_mb: Annotated[Number, Field(gt=0, le=1e9)] | None = Field(
         default=500.0,
-        description="Less free in the folder of the state file than this (MB); null: never told.",
+        description="Less free space than this in the folder of the state file (MB); null: never.",
     )
 
 
