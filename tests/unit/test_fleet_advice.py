@@ -5,7 +5,7 @@ import pytest
 
 from gliderwatch.fleet import advice
 from gliderwatch.fleet import scalar_field as sf
-from gliderwatch.fleet.advice import Bounds, Box, Leg, advise, gain, gradient, mean_variance
+from gliderwatch.fleet.advice import Bounds, Box, Leg, advise, gains, gradient, mean_variance
 from gliderwatch.fleet.scalar_field import FieldParams
 from gliderwatch.model import readonly
 from gliderwatch.navigation.geodesy import to_plane
@@ -51,7 +51,7 @@ def test_gradient_is_the_slope_of_the_mean_variance(known):
 def test_gain_of_a_leg_is_what_its_samples_take_away(known):
     after = advice.with_planned(known, [(LEG, 1.0)], BOX, PARAMS)
     fallen = mean_variance(known, PARAMS) - mean_variance(after, PARAMS)
-    assert gain(sf.inverse(known.d), LEG, 1.0, BOX, PARAMS) == pytest.approx(fallen)
+    assert gains(sf.inverse(known.d), LEG, [0.0, 1.0], BOX, PARAMS)[1] == pytest.approx(fallen)
 
 
 @pytest.mark.parametrize("way", ["gradient", "look_ahead"])
@@ -74,8 +74,9 @@ def test_the_waypoint_goes_with_the_water(known):
 def test_the_look_ahead_takes_the_best_of_its_legs(known):
     found = advise(known, LEG, BOX, Bounds(), PARAMS)
     cov = sf.inverse(known.d)
-    gains = [gain(cov, LEG, k * np.pi / 6, BOX, PARAMS) for k in range(12)]
-    assert gain(cov, LEG, found.heading, BOX, PARAMS) == pytest.approx(max(gains))
+    lowered = gains(cov, LEG, [k * np.pi / 6 for k in range(12)], BOX, PARAMS)
+    assert found.heading == pytest.approx(np.argmax(lowered) * np.pi / 6)
+    assert found.variance == pytest.approx(max(lowered) / mean_variance(known, PARAMS))
 
 
 def test_away_from_others(known):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import cos, inf, tau
+from math import cos, tau
 from typing import Literal
 
 import numpy as np
@@ -103,7 +103,7 @@ class Advice:
     lat: float
     lon: float
     variance: float
-    apart: float
+    apart: float | None
 
 
 def mean_variance(known: Information, params: FieldParams) -> float:
@@ -120,10 +120,11 @@ def gradient(cov: Array, place: Array, params: FieldParams) -> Array:
     depth = (np.arange(LOOK_DEPTHS) + 0.5) / LOOK_DEPTHS
     at = np.column_stack([np.tile(place, (LOOK_DEPTHS, 1)), depth])
     phi, slopes = rows(at, params), _slopes(at, params)
-    about = cov @ overlap(params) @ cov
+    seen = phi @ cov
+    about = seen @ overlap(params) @ cov
     r = sample_variance(np.ones(1), params)[0]
-    top, low = np.einsum("ni,ni->n", phi @ about, phi), r + np.einsum("ni,ni->n", phi @ cov, phi)
-    top_slope, low_slope = (2 * np.einsum("kni,ni->kn", slopes, phi @ matrix) for matrix in (about, cov))
+    top, low = np.einsum("ni,ni->n", about, phi), r + np.einsum("ni,ni->n", seen, phi)
+    top_slope, low_slope = (2 * np.einsum("kni,ni->kn", slopes, each) for each in (about, seen))
     return np.asarray(((top_slope * low - top * low_slope) / low**2).mean(axis=1))
 
 
@@ -139,22 +140,31 @@ def leg_samples(leg: Leg, heading: float, box: Box) -> Array:
     return place
 
 
-def gain(cov: Array, leg: Leg, heading: float, box: Box, params: FieldParams) -> float:
-    """By how much J falls once a leg is flown: tr(M C Phi' (R + Phi C Phi')^-1 Phi C)."""
-    phi, noise = _measurement(leg, heading, box, params)
+def gains(cov: Array, leg: Leg, headings: Sequence[float], box: Box, params: FieldParams) -> list[float]:
+    """By how much J falls once a leg is flown, by its heading: tr(M C Phi' (R + Phi C Phi')^-1 Phi C)."""
+    legs = [_measurement(leg, heading, box, params) for heading in headings]
+    phi = np.vstack([rows for rows, _ in legs])
     seen = phi @ cov
-    solved = np.linalg.solve(noise * np.eye(len(phi)) + seen @ phi.T, seen)
-    return float(np.sum(solved * (seen @ overlap(params))))
+    weighed = seen @ overlap(params)
+    out, start = list[float](), 0
+    for part, noise in legs:
+        here = slice(start, start + len(part))
+        start += len(part)
+        inner = noise * np.eye(len(part)) + seen[here] @ part.T
+        out.append(float(np.sum(np.linalg.solve(inner, seen[here]) * weighed[here])))
+    return out
 
 
 def with_planned(
     known: Information, legs: Sequence[tuple[Leg, float]], box: Box, params: FieldParams
 ) -> Information:
     """What will be known, values apart, once other gliders have flown ``legs`` with their headings (rad)."""
-    for leg, heading in legs:
-        phi, noise = _measurement(leg, heading, box, params)
-        known = update(known, phi, phi @ np.zeros(params.size), np.full(len(phi), noise))
-    return known
+    if not legs:
+        return known
+    flown = [_measurement(leg, heading, box, params) for leg, heading in legs]
+    phi = np.vstack([rows for rows, _ in flown])
+    noise = np.concatenate([np.full(len(rows), variance) for rows, variance in flown])
+    return update(known, phi, np.zeros(len(phi)), noise)
 
 
 def advise(
@@ -179,14 +189,12 @@ def advise(
     allowed = [h for h in headings.tolist() if is_allowed(leg, h, box, bounds)]
     if not allowed:
         return None
-    gains = {h: gain(cov, leg, h, box, params) for h in allowed} if way == "look_ahead" else {}
-    best = max(allowed, key=lambda h: gains[h] if gains else cos(h - first))
-    lowered = gains.get(best) or gain(cov, leg, best, box, params)
+    if way == "gradient":
+        allowed = [max(allowed, key=lambda heading: cos(heading - first))]
+    lowered, best = max(zip(gains(cov, leg, allowed, box, params), allowed, strict=True))
     lat, lon = leg.end(best)
-    apart = _distances(bounds.others, lat, lon)
-    return Advice(
-        best % tau, lat, lon, lowered / float(np.sum(cov * overlap(params))), float(min(apart, default=inf))
-    )
+    apart = min(_distances(bounds.others, lat, lon).tolist(), default=None)
+    return Advice(best % tau, lat, lon, lowered / float(np.sum(cov * overlap(params))), apart)
 
 
 def is_allowed(leg: Leg, heading: float, box: Box, bounds: Bounds) -> bool:

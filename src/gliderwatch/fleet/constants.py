@@ -40,6 +40,18 @@ PAPER_WALK = 2e-3 / 3600.0
 BIN = 3600.0
 """s: samples of one such bin are taken as of one time. A field changes over days."""
 
+SAMPLE_STEP = 60.0
+"""s: finer samples are averaged to one before they are kept: 6 to 16 m of depth, within a Gaussian's spread
+in a box of 100 m."""
+SENSORS_OF_FIELDS = {
+    "sci_water_temp": (1.0, 15.0, 10.0, "degree_Celsius"),
+    "salinity": (0.2, 33.0, 10.0, "1"),
+    "density": (0.3, 25.0, 10.0, "kg m-3"),
+    "oxygen": (15.0, 250.0, 100.0, "umol l-1"),
+}
+"""Of each sensor of a field: usual deviation from the mean profile, mean and spread of that before any
+sample, and the unit of all three. Upper ocean of middle latitudes; the spread holds the other seas."""
+
 # Where to look next
 HEADINGS = 12
 """Headings that the look-ahead compares."""
@@ -50,6 +62,11 @@ LEG_SAMPLES = 24
 APART = 5e3
 """m that the end of the next leg keeps from other gliders and from the ends of theirs: half the spread of a
 Gaussian on a box of 60 km."""
+
+USUAL_LEG = 3 * 3600.0
+"""s until the next surfacing of a glider of which it is not known."""
+NO_MORE_AT_SEA = 86400.0
+"""s since the last surfacing of another glider after which it is not reckoned with."""
 
 # The flow
 FLOW_SCALE = 60e3

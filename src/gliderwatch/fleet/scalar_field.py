@@ -192,8 +192,9 @@ def update(known: Information, phi: Array, value: Array, variance: Array) -> Inf
 
     D + Phi^T R^-1 Phi, g + Phi^T R^-1 y.
     """
-    weighted = phi / variance[:, None]
-    return Information(known.d + weighted.T @ phi, known.g + weighted.T @ value)
+    root = 1 / np.sqrt(variance)
+    scaled = phi * root[:, None]
+    return Information(known.d + scaled.T @ scaled, known.g + scaled.T @ (value * root))
 
 
 def run(start: Checkpoint | None, batches: Iterable[Batch], params: FieldParams) -> tuple[Checkpoint, ...]:
@@ -202,17 +203,15 @@ def run(start: Checkpoint | None, batches: Iterable[Batch], params: FieldParams)
     ``batches`` are all that have samples in those bins, in any order; samples of earlier bins are passed
     over.
     """
-    parts: dict[int, list[tuple[str, Batch]]] = {}
-    for batch in batches:
+    parts: dict[int, list[Batch]] = {}
+    for batch in sorted(batches, key=lambda each: each.id):
         for k in np.unique(np.floor(batch.t / BIN)).astype(int).tolist():
             if start is None or k > start.bin:
-                parts.setdefault(k, []).append((batch.id, batch))
+                parts.setdefault(k, []).append(batch)
     last, out = start, list[Checkpoint]()
     for k in sorted(parts):
         known = prior(params) if last is None else elapse(last.known, (k - last.bin) * BIN, params)
-        for _, batch in sorted(parts[k], key=lambda part: part[0]):
-            known = _with_samples(known, batch, k, params)
-        last = Checkpoint(k, known)
+        last = Checkpoint(k, _with_samples(known, parts[k], k, params))
         out.append(last)
     return tuple(out)
 
@@ -254,10 +253,16 @@ def inverse(matrix: Array) -> Array:
     return np.asarray(below + below.T + np.diag(half.diagonal()))
 
 
-def _with_samples(known: Information, batch: Batch, k: int, params: FieldParams) -> Information:
-    inside = np.floor(batch.t / BIN) == k
-    phi = rows(batch.place[inside], params)
-    return update(known, phi, batch.value[inside] - params.mean, sample_variance(batch.stand[inside], params))
+def _with_samples(known: Information, batches: list[Batch], k: int, params: FieldParams) -> Information:
+    """What is known with the samples of one bin."""
+    inside = [np.floor(batch.t / BIN) == k for batch in batches]
+
+    def of(name: str) -> Array:
+        parts = [getattr(batch, name)[here] for batch, here in zip(batches, inside, strict=True)]
+        return np.concatenate(parts)
+
+    variance = sample_variance(of("stand"), params)
+    return update(known, rows(of("place"), params), of("value") - params.mean, variance)
 
 
 @cache
