@@ -13,8 +13,6 @@ ALLOWED = {
     "Store.clock_steps": "tests of clocks that fall back look at it",
     "metropolis": "the consensus of paper 003, for comparison: benchmarks/fleet_field.py",
     "mean_variance": "J of paper 003; tests of the gradient look at it",
-    "advise": "benchmarks/fleet_field.py sends its gliders by it",
-    "with_planned": "the same",
     "fleet_flow": "the reference by the fleet: tests measure it, the estimate reads it next",
     "fused": "the same",
     "is_sent": "benchmarks/sensors.py asks which sensors a mission has",

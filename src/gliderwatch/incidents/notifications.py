@@ -9,6 +9,7 @@ from math import ceil
 from types import MappingProxyType
 from typing import Protocol
 
+from gliderwatch.fleet.advice import Advice
 from gliderwatch.incidents.aborts import Episode
 from gliderwatch.incidents.acknowledgement import Acks
 from gliderwatch.incidents.calls import Empty
@@ -82,11 +83,13 @@ def due_notifications(
     reminder_hours: float | None,
     notices: bool,
     acks: Acks = NO_ACKS,
+    advice: tuple[tuple[str, Advice], ...] = (),
 ) -> tuple[NotificationState, list[Alert]]:
     """The messages to send now, and what will have been said then.
 
     `notices`: whether anyone wants a notice of each surfacing. An incident that somebody has acknowledged
-    (`acks`) is not brought to mind, unless it has grown worse since.
+    (`acks`) is not brought to mind, unless it has grown worse since. `advice`: where to look next, by the
+    name of the field.
     """
     latest = known.last_surfacing(float("inf"))
     if latest is None:
@@ -115,7 +118,9 @@ def due_notifications(
         expected = known.expected(float("inf"))
         if expected is not None and expected.after < latest.t_surface:
             expected = None  # of an earlier surfacing: the last dive cannot be used
-        alerts.append(incident_text.surfacing(latest, previous, alert_id=identity, expected=expected))
+        alerts.append(
+            incident_text.surfacing(latest, previous, alert_id=identity, expected=expected, advice=advice)
+        )
         surfaced = latest.t_surface
     said = replace(said, threads=tuple(threads), surfaced=surfaced)
     return said, sorted(alerts, key=lambda a: a.time)

@@ -7,6 +7,9 @@ each is made one printable line (`words.clean`). The caller gives each alert its
 
 from __future__ import annotations
 
+from math import degrees
+
+from gliderwatch.fleet.advice import Advice
 from gliderwatch.messages.evidence import checks, difference, how_sure, out_of_range, weigh
 from gliderwatch.messages.formatting import (
     INCIDENTS,
@@ -163,9 +166,11 @@ def surfacing(
     *,
     alert_id: str,
     expected: NextSurfacing | None = None,
+    advice: tuple[tuple[str, Advice], ...] = (),
     audience: Severity = Severity.INFO,
 ) -> Alert:
-    """The notice of one surfacing; `previous` is the time of the one before (s), `expected` the next."""
+    """The notice of one surfacing; `previous` is the time of the one before (s), `expected` the next,
+    `advice` where to look next for a field."""
     a = assessment
     after: tuple[tuple[str, str], ...] = ()
     if previous is not None:
@@ -173,6 +178,7 @@ def surfacing(
     if expected is not None:
         when = f"{utc(expected.t)}, within {duration(1.96 * expected.t_sigma)} (95 %)"
         after += (("Next surfacing", f"{when}, {place(expected.lat, expected.lon)}"),)
+    after += tuple((f"Look next for {clean(name, 64)}", _advice(each)) for name, each in advice)
     page = Page(
         (f"{_glider(a)} surfaced {utc(a.t_surface)}: {flag_words(a)}.",),
         (*after, *_facts(a, 0)),
@@ -189,6 +195,12 @@ def surfacing(
         alert_id=alert_id,
         audience=audience,
     )
+
+
+def _advice(advice: Advice) -> str:
+    """Heading and waypoint of an advice, and what it is good for."""
+    steer = f"steer {degrees(advice.heading):03.0f} deg true to {place(advice.lat, advice.lon)}"
+    return f"{steer}: takes {100 * advice.variance:.1f} % off the uncertainty"
 
 
 def operator(

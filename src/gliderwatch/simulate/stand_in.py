@@ -6,6 +6,8 @@ A box of 60 x 60 km and 100 m, as the paper's; its values are anomalies of 18.34
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from gliderwatch.model import Array
@@ -15,6 +17,21 @@ SIDE, DEPTH = 60e3, 100.0
 MEAN = 18.34
 """Degrees Celsius that are taken off: about the mean in the box."""
 _TURN = 2 * np.pi
+
+
+@dataclass(frozen=True, slots=True)
+class StandIn:
+    """The box in a simulated sea: the sea's origin lies ``east`` and ``north`` (m) of its corner; ``start``
+    (s)."""
+
+    east: float
+    north: float
+    start: float
+
+    def water(self, t: Array, east: Array, north: Array, depth: Array) -> Array:
+        """Temperature (degrees Celsius) at times (s), places (m from the sea's origin) and depths (m)."""
+        place = [(self.east + east) / SIDE, (self.north + north) / SIDE, depth / DEPTH]
+        return MEAN + temperature(np.stack(place, axis=-1), t - self.start)
 
 
 def temperature(place: Array, t: Array | float) -> Array:
