@@ -73,7 +73,7 @@ def simulate(name: str, seed: int, out: Path, as_json: bool) -> None:
 @click.option(
     "--sensor",
     default="temperature",
-    help="temperature, salinity, density, or the name of a science sensor (temperature).",
+    help="temperature, salinity, density, oxygen, or the name of a science sensor (temperature).",
 )
 @click.option("--json", "as_json", is_flag=True, help="Segments and means as JSON.")
 def replay(mission: Path, caches: tuple[Path, ...], glider: str | None, sensor: str, as_json: bool) -> None:
@@ -107,13 +107,14 @@ def _near(mission: Path) -> tuple[Path, ...]:
 
 def _casts(mission: Path, caches: Sequence[Path], glider: str | None, sensor: str) -> list[tuple[Cast, ...]]:
     """The casts of each segment of one glider in a folder, in order of time; of copies the fullest."""
-    from gliderwatch.layers.casts import split
+    from gliderwatch.layers.water import casts_of
     from gliderwatch.slocum import folders
     from gliderwatch.slocum.decode import Decoder, decode_science
 
     paths = sorted(path for path in mission.rglob("*") if folders.is_science(path.name))
+    own = None if sensor in ("temperature", "salinity", "density", "oxygen") else sensor
     best: dict[SegmentId, Segment] = {}
-    with Decoder(caches, decode=partial(decode_science, property_name=sensor)) as decoder:
+    with Decoder(caches, decode=partial(decode_science, sensor=own)) as decoder:
         for path, result in decoder.map(paths):
             if not isinstance(result, Segment):
                 click.echo(f"{path.name} left out: {result}", err=True)
@@ -123,7 +124,7 @@ def _casts(mission: Path, caches: Sequence[Path], glider: str | None, sensor: st
     if len(gliders) > 1:
         raise GliderwatchError(f"{mission} holds several gliders: --glider {' or '.join(sorted(gliders))}")
     chosen = [best[one] for one in sorted(best) if one.glider in gliders]
-    return [split(one.get("science_depth"), one.get(f"science_{sensor}")) for one in chosen]
+    return [casts_of(one, sensor) for one in chosen]
 
 
 def _summary(preset: Preset, run: Run) -> dict[str, Any]:

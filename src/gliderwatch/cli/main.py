@@ -8,6 +8,7 @@ import sys
 import click
 
 from gliderwatch import __version__
+from gliderwatch.cli.field import field
 from gliderwatch.cli.layers import layers
 from gliderwatch.cli.look import LOOKING
 from gliderwatch.cli.manage import COMMANDS
@@ -26,5 +27,5 @@ def main() -> None:
             stream.reconfigure(errors="replace")
 
 
-for command in (run, *LOOKING, *COMMANDS, simulate, score, layers):
+for command in (run, *LOOKING, *COMMANDS, field, layers, simulate, score):
     main.add_command(command)

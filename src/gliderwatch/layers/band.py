@@ -48,8 +48,8 @@ class Tracking:
 
     ``mode`` and ``band`` are the advice for the next segment; the band is None where all depths are to be
     flown. ``top`` and ``bottom`` (m) are the smoothed limits of the layers, ``peak`` (unit per m) the
-    reference of the gradient, ``complete_t`` (s) the end of the last segment of all depths, ``bin`` (m) and ``layers``
-    those of the last segment, ``why`` says in words why the mode is what it is.
+    reference of the gradient, ``complete_t`` (s) the end of the last segment of all depths, ``bin`` (m)
+    and ``layers`` those of the last segment, ``why`` says in words why the mode is what it is.
     """
 
     mode: Mode = Mode.COMPLETE

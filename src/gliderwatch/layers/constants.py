@@ -50,3 +50,5 @@ PEAK_EXTENSION = 4.0
 """Bins: what the method that follows the peak adds; it has the travel of the published method with it."""
 COUNTED = 6
 """Casts that a segment has to have to count in a comparison of methods: shorter ones are test dives."""
+LATITUDE = 45.0
+"""Degrees: where depths are made of pressures; elsewhere they are 0.3 % off, less than a sample's spacing."""
