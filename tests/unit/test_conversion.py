@@ -13,6 +13,7 @@ import pytest
 from gliderwatch.errors import LayoutError, StateError
 from gliderwatch.incidents.acknowledgement import Ack
 from gliderwatch.incidents.notifications import NotificationState
+from gliderwatch.layers.advice import Layered
 from gliderwatch.model import Alert, Assessment, Incident, Kind, NextSurfacing, Segment
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, process
@@ -30,6 +31,7 @@ ROWS = {
     NotificationState: "said",
     Ack: "acks",
     Alert: "alerts",
+    Layered: "layers",
 }
 
 
