@@ -207,6 +207,22 @@ def test_benchmarks_are_run_as_their_page_says() -> None:
         assert all(f'"{flag}"' in code for flag in re.findall(r"--[a-z-]+", arguments)), (script, arguments)
 
 
+def test_benchmarks_import_what_there_is() -> None:
+    """They are run by hand and seldom."""
+    gone = []
+    for path in sorted((ROOT / "benchmarks").glob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("gliderwatch"):
+                module = importlib.import_module(str(node.module))
+                gone += [
+                    f"{path.name}: {node.module}.{each.name}"
+                    for each in node.names
+                    if not hasattr(module, each.name)
+                    and importlib.util.find_spec(f"{node.module}.{each.name}") is None
+                ]
+    assert gone == []
+
+
 def test_events_of_the_log_are_described() -> None:
     rows = re.findall(
         r"^\| ((?:`[^`]+`(?:, )?)+) \| (?:info|warning|error) \|", text("docs/operations.md"), re.M

@@ -17,6 +17,7 @@ from gliderwatch.config.fields import GliderName, Name, Section
 from gliderwatch.config.schema import (
     Channel,
     Dockserver,
+    FieldSetting,
     Glider,
     Heartbeat,
     Metrics,
@@ -42,6 +43,9 @@ class Config(Section):
 
     dockserver: Dockserver = Field(description="Where files arrive.")
     ocean: Ocean = Field(default=Ocean(), description="An ocean model, for `reference: model`.")
+    fields: dict[Name, FieldSetting] = Field(
+        default_factory=dict, description="Fields that the gliders measure together."
+    )
     state: State = Field(default=State(), description="What gliderwatch remembers.")
     defaults: Settings = Field(default=Settings(), description="Settings of all gliders.")
     gliders: dict[GliderName, Glider] = Field(

@@ -25,6 +25,7 @@ from gliderwatch.config.fields import (
     Url,
     Zone,
 )
+from gliderwatch.fleet.constants import APART
 from gliderwatch.incidents import send_schedule
 from gliderwatch.model import Severity
 from gliderwatch.params import AnomalyRule, Attention, FalseAlarmRule, GliderParams, LearnerParams, RuleParams
@@ -276,6 +277,65 @@ class Ocean(Section):
     stale_hours: Annotated[Number, Field(gt=0, le=8760)] = Field(
         default=STALE / 3600, description="Hours beyond the last time of the files until which it is used."
     )
+
+
+class FieldAdvice(Section):
+    """Where gliders are advised to look next for a field. Nothing is ever sent to a glider."""
+
+    outputs: AbsolutePath = Field(
+        description="Folder for the mission arguments `goto` of each glider, for a pilot to check and send."
+    )
+    way: Literal["look_ahead", "gradient"] = Field(
+        default="look_ahead",
+        description="`look_ahead`: the best of 12 headings for the whole leg; `gradient`: that of the paper.",
+    )
+    polygon: tuple[
+        tuple[Annotated[Number, Field(ge=-90, le=90)], Annotated[Number, Field(ge=-180, le=360)]], ...
+    ] = Field(
+        default=(),
+        description="Corners [latitude, longitude] of where gliders may be sent; empty: the whole box.",
+    )
+    shallowest: Annotated[Number, Field(ge=0, le=12000)] | None = Field(
+        default=None,
+        description="Water depth (m) that is too shallow, by what the gliders have measured nearest to the "
+        "way; null: any is deep enough.",
+    )
+    apart_km: Annotated[Number, Field(ge=0, le=1000)] = Field(
+        default=APART / 1e3, description="Distance that waypoints keep from other gliders (km)."
+    )
+
+    @model_validator(mode="after")
+    def _has_corners(self) -> FieldAdvice:
+        if 0 < len(self.polygon) < 3:
+            raise ValueError("polygon needs three corners or more")
+        return self
+
+
+class FieldSetting(Section):
+    """A field that the gliders measure together in a part of the sea (`fleet`)."""
+
+    box: BoxSetting = Field(description="The part of the sea.")
+    depth: tuple[Annotated[Number, Field(ge=0)], Annotated[Number, Field(gt=0, le=2000)]] = Field(
+        description="Its top and bottom (m)."
+    )
+    sensor: Literal["sci_water_temp", "salinity", "density", "oxygen"] = Field(
+        default="sci_water_temp",
+        description="What is measured; salinity and density (potential, less 1000 kg/m3) follow by TEOS-10.",
+    )
+    estimator: Literal["fading", "literal"] = Field(
+        default="fading",
+        description="`fading`: what is known fades, and the mean profile is apart; `literal`: as the paper "
+        "has it.",
+    )
+    advice: FieldAdvice | None = Field(default=None, description="Where to look next; null: none is given.")
+
+    @model_validator(mode="after")
+    def _has_extent(self) -> FieldSetting:
+        if not (self.box.south < self.box.north and self.box.west % 360 != self.box.east % 360):
+            raise ValueError("box is empty: south must be below north, and west another than east")
+        if not self.depth[0] < self.depth[1]:
+            raise ValueError("depth is empty: write [TOP, BOTTOM]")
+        return self
 
 
 class State(Section):
