@@ -176,7 +176,3 @@ def test_faults_are_shown_with_a_column_for_each_sea():
     assert cells["calm"] == ["0%"]
 
 
-def test_without_the_package_that_draws_the_cure_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(GliderwatchError, match="pip install matplotlib"):
-        plots.pyplot()

@@ -35,13 +35,14 @@ ARROW = 60.0
 """Units of the picture for a current of 1 m/s, if the greatest one is not longer than `LONGEST`."""
 LONGEST = 50.0
 STYLE = """\
-.map{background:var(--sea);font:12px system-ui,sans-serif}.map text{fill:var(--ink)}.map .land{fill:var(--land);
-stroke:var(--shore);stroke-width:.8}.map .grid{stroke:var(--ink);stroke-opacity:.18;fill:none}.map .faint{
+.map{background:var(--sea);font:12px system-ui,sans-serif}.map text{fill:var(--ink)}
+.map .land{fill:var(--land);stroke:var(--shore);stroke-width:.8}.map .grid{stroke:var(--ink);stroke-opacity:.18;fill:none}.map .faint{
 fill-opacity:.65;font-size:10px}.map .track{fill:none;stroke:var(--quiet);stroke-width:1.5}.map .current{
 stroke:var(--ok);stroke-width:1.4;fill:none}.map .area{fill:var(--warn);fill-opacity:.13;stroke:var(--warn);
 stroke-width:1.4;stroke-dasharray:5 3}.map .next{fill:var(--ok);fill-opacity:.13;stroke:var(--ok);
 stroke-width:1.4}.map .mark{stroke:var(--paper);stroke-width:1}.ok{fill:var(--ok)}.warn{fill:var(--warn)}
-.bad{fill:var(--bad)}.quiet{fill:var(--quiet)}.map .halo{paint-order:stroke;stroke:var(--sea);stroke-width:3px}
+.bad{fill:var(--bad)}.quiet{fill:var(--quiet)}
+.map .halo{paint-order:stroke;stroke:var(--sea);stroke-width:3px}
 """
 """How the parts of a map look, by the colours of its page."""
 
@@ -234,9 +235,7 @@ def _arrow(x: float, y: float, dx: float, dy: float) -> str:
     head = min(5.0, length / 2)
     ux, uy = dx / length, dy / length
     tip = (x + dx, y + dy)
-    sides = [
-        (tip[0] - head * (ux + s * uy * 0.6), tip[1] - head * (uy - s * ux * 0.6)) for s in (-1.0, 1.0)
-    ]
+    sides = [(tip[0] - head * (ux + s * uy * 0.6), tip[1] - head * (uy - s * ux * 0.6)) for s in (-1.0, 1.0)]
     (ax, ay), (bx, by) = sides
     way = f"M{x:.1f} {y:.1f}L{tip[0]:.1f} {tip[1]:.1f}M{ax:.1f} {ay:.1f}L{tip[0]:.1f} {tip[1]:.1f}"
     return f'<path class="current" d="{way}L{bx:.1f} {by:.1f}"/>'
