@@ -22,11 +22,10 @@ from gliderwatch.messages.formatting import clean, duration
 from gliderwatch.messages.samples import sample
 from gliderwatch.model import Alert, Kind, Severity
 from gliderwatch.service.liveness import STALE, is_held, seconds_silent
-from gliderwatch.slocum.caches import Staging
+from gliderwatch.slocum.caches import Staging, lists_folder
 from gliderwatch.slocum.cycles import parse_sensor_list
 from gliderwatch.slocum.folders import Found, find_places, scan
 from gliderwatch.slocum.header import Header, parse_header, plain, read_header, read_regular
-from gliderwatch.slocum.sensor_lists import lists_folder
 from gliderwatch.store.database import SCHEMA
 from gliderwatch.store.watch_health import Failing, failing, quick_check, schema_version
 
@@ -341,15 +340,15 @@ def state(config: Config, problems: Iterable[Problem]) -> Findings:
         yield note("state", f"{path} is not there yet: the service makes it at its first start")
         return
     try:
-        version, told = schema_version(path), quick_check(path)
+        version, pages = schema_version(path), quick_check(path)
     except DamagedError as problem:
-        told, version = str(problem), SCHEMA
+        pages, version = str(problem), SCHEMA
     except StateError as problem:
         yield error("state", str(problem), "ask as the user of the service; else see docs/state-file.md")
         return
-    if told != "ok":
+    if pages != "ok":
         cure = "stop the service, move the file away, start: all is learnt anew from the files"
-        yield error("state", f"{path} is damaged: {told}", cure)
+        yield error("state", f"{path} is damaged: {pages}", cure)
     elif version < SCHEMA:
         yield note("state", f"{path} is whole; schema {version} becomes {SCHEMA} at the next start")
     else:

@@ -261,10 +261,10 @@ class Dispatcher:
                 pause = self._pass(store)
                 trouble, self._beat = "", time.monotonic()
             except Exception as error:  # a locked or full disk passes: this thread must not end by it
-                if (told := f"{type(error).__name__}: {error}") != trouble:
-                    log.error("outbox cannot be read or written", error=told)
+                if (failure := f"{type(error).__name__}: {error}") != trouble:
+                    log.error("outbox cannot be read or written", error=failure)
                 _close(store)
-                store, pause, trouble = None, 1.0, told
+                store, pause, trouble = None, 1.0, failure
             self._wake.wait(pause)
         _close(store)
         for worker in self._workers.values():

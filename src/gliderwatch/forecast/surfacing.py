@@ -45,8 +45,8 @@ from gliderwatch.forecast.constants import (
 from gliderwatch.forecast.steering import WAYS, Plan, courses
 from gliderwatch.forecast.timing import quantile
 from gliderwatch.model import Array, Dive, Fix, NextSurfacing, Segment, Unusable
+from gliderwatch.navigation.flight import joined
 from gliderwatch.navigation.geodesy import displacement, from_plane
-from gliderwatch.navigation.samples import joined
 
 # ----------------------------------------
 # What is remembered of past surfacings, and what follows from it for the way ahead.
@@ -130,27 +130,27 @@ def factor(misses: Sequence[float]) -> float:
 # Which waypoint a glider was bound for when it came up.
 
 WaypointLog = tuple[tuple[float, float, float], ...]
-"""Waypoints as they were told: time (s), latitude and longitude (degrees), in order of time."""
+"""Waypoints as they were reported: time (s), latitude and longitude (degrees), in order of time."""
 
 
-def read_waypoints(known: WaypointLog, segment: Segment) -> WaypointLog:
-    """The waypoints told until now and those in one more segment; what changes nothing is left out."""
+def read_waypoints(before: WaypointLog, segment: Segment) -> WaypointLog:
+    """The waypoints reported until now and those in one more segment; what changes nothing is left out."""
     t, lat, lon = joined(segment.get("waypoint_lat"), segment.get("waypoint_lon"))
-    told = zip(t.tolist(), lat.tolist(), lon.tolist(), strict=True)
+    reported = zip(t.tolist(), lat.tolist(), lon.tolist(), strict=True)
     out: list[tuple[float, float, float]] = []
-    for report in sorted({*known, *told}):
+    for report in sorted({*before, *reported}):
         if not out or report[1:] != out[-1][1:]:
             out.append(report)
     return tuple(out[-WAYPOINTS_HEARD:])
 
 
-def active_waypoint(known: WaypointLog, t: float) -> Place | None:
-    """The waypoint at a fix at time ``t`` (s), of those told; None before any.
+def active_waypoint(log: WaypointLog, t: float) -> Place | None:
+    """The waypoint at a fix at time ``t`` (s), of those reported; None before any.
 
     >>> active_waypoint(((0.0, 27.0, -84.0), (9000.0, 27.5, -84.0)), 8000.0)
     (27.0, -84.0)
     """
-    before = [(lat, lon) for told, lat, lon in known if told <= t + WAYPOINT_LATE]
+    before = [(lat, lon) for reported, lat, lon in log if reported <= t + WAYPOINT_LATE]
     return before[-1] if before else None
 
 
@@ -164,8 +164,8 @@ def learn(
     """The state after one more dive; one that has not ended changes nothing.
 
     Dives come in order; one whose current was corrected is taken again from the state before it.
-    ``waypoint`` (degrees) is the last one told until now; ``expected`` what was made of ``state``, with which
-    the ellipse is calibrated (None: nothing was). A new deployment begins anew.
+    ``waypoint`` (degrees) is the last one reported until now; ``expected`` what was made of ``state``, with
+    which the ellipse is calibrated (None: nothing was). A new deployment starts from nothing.
     """
     end = dive.end
     if end is None:
@@ -247,10 +247,10 @@ def _misses(state: Surfacings, dive: Dive, end: Fix, expected: NextSurfacing | N
     return (*state.misses, distance)[-MISSES_KEPT:]
 
 
-def _waypoints(known: tuple[Place, ...], told: Place | None) -> tuple[Place, ...]:
-    if told is None or (known and is_same(known[-1], told)):
+def _waypoints(known: tuple[Place, ...], reported: Place | None) -> tuple[Place, ...]:
+    if reported is None or (known and is_same(known[-1], reported)):
         return known
-    return (*known, told)[-WAYPOINTS_KEPT:]
+    return (*known, reported)[-WAYPOINTS_KEPT:]
 
 
 def _flown(state: Surfacings, dive: Dive) -> Surfacings:

@@ -1,12 +1,15 @@
-"""A past mission through the same path as a live one, with a state of its own."""
+"""A past mission through the same path as a live one, with a state of its own; and what it says when nothing
+could be assessed."""
 
 from __future__ import annotations
 
+import os
+import shlex
 import tempfile
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,59 +19,123 @@ from gliderwatch.delivery.channels import Channel
 from gliderwatch.delivery.dispatcher import Dispatcher
 from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine, Retry
 from gliderwatch.incidents.constants import GONE
+from gliderwatch.messages.formatting import clean
 from gliderwatch.model import Alert, Hindrance, Segment
 from gliderwatch.navigation.clock import Stamp, corrections, is_same, numbered
 from gliderwatch.params import GliderParams
-from gliderwatch.service import transaction, triage
+from gliderwatch.service import judgement, transaction
+from gliderwatch.service.backlog import Job
 from gliderwatch.service.jsonl import alert_line, assessment_line, write_lines
 from gliderwatch.service.liveness import alive_path
-from gliderwatch.service.ocean_cache import OceanCache
-from gliderwatch.service.replay_logs import Log, find_logs, read_logs
+from gliderwatch.service.replay_order import Log, ReplayOrder, find_logs, read_logs
 from gliderwatch.service.routing import NOBODY, Routing, routing_of
-from gliderwatch.service.triage import Job
+from gliderwatch.service.runtime import OceanCache
+from gliderwatch.slocum import folders
+from gliderwatch.slocum.caches import SensorLists, lists_folder
 from gliderwatch.slocum.decode import Decoder
 from gliderwatch.slocum.folders import kind, rank
 from gliderwatch.slocum.header import read_header
-from gliderwatch.slocum.sensor_lists import SensorLists, lists_folder
 from gliderwatch.store.database import MEMORY, refuse_foreign
 from gliderwatch.store.outbox import Outbox
 from gliderwatch.store.state_file import File, Status, Store
 
 # ----------------------------------------
+# A replay that assessed nothing: why, in one line, and what to do about it.
+
+_ABOVE = 4
+"""Folders above the one replayed in which cache files are looked for, with the folders beside these."""
+_MOST = 2000
+"""Entries of a folder that are looked at."""
+_SHOWN = 3
+
+
+def unassessed(store: Store, folders: Iterable[Path]) -> str | None:
+    """Why the replay of `folders` assessed no dive, with the cure; None where it assessed one."""
+    if any(store.extent(glider)[1] for glider in store.gliders()):
+        return None
+    left_out = {s: store.files(s) for s in (Status.WAITING, Status.UNKNOWN, Status.QUARANTINED)}
+    status = max(left_out, key=lambda s: len(left_out[s]))
+    files = left_out[status]
+    if not files:
+        return "nothing was assessed: the files were read, but none holds a dive"
+    said = {Status.WAITING: _waiting, Status.UNKNOWN: _unknown, Status.QUARANTINED: _bad}[status]
+    return f"nothing was assessed: {said(files, folders)}"
+
+
+def _waiting(files: Sequence[File], folders: Iterable[Path]) -> str:
+    wanted = {file.crc.lower() for file in files if file.crc}
+    if not wanted:
+        return f"{_number(files)} cannot be read now ({clean(files[0].reason)}): try again later"
+    place = nearby(wanted, folders)
+    cure = "name its folder: --cache FOLDER" if place is None else f"add --cache {shlex.quote(_short(place))}"
+    lacking = _some(f"{crc}.cac" for crc in wanted)
+    return f"{_number(files)} {'wait' if len(files) > 1 else 'waits'} for {lacking}: {cure}"
+
+
+def _unknown(files: Sequence[File], _folders: Iterable[Path]) -> str:
+    gliders = {file.glider for file in files}
+    return (
+        f"{_number(files)} of {_some(gliders)}, not in the configuration: "
+        "add the name under `gliders`, or leave -c out"
+    )
+
+
+def _bad(files: Sequence[File], _folders: Iterable[Path]) -> str:
+    return (
+        f"{_number(files)} cannot be used ({clean(files[0].reason)}): "
+        "name a folder with flight data of a glider (sbd, scd, mbd, mcd, dbd, dcd)"
+    )
+
+
+def _number(files: Sequence[File]) -> str:
+    return "1 file" if len(files) == 1 else f"{len(files)} files"
+
+
+def _some(words: Iterable[str]) -> str:
+    found = sorted(words)
+    more = f" and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
+    return ", ".join(clean(word, 60) for word in found[:_SHOWN]) + more
+
+
+def _short(path: Path) -> str:
+    """A path as one would type it here."""
+    relative = os.path.relpath(path)
+    return relative if len(relative) < len(str(path)) else str(path)
+
+
+def nearby(crcs: Collection[str], folders: Iterable[Path]) -> Path | None:
+    """The folder that holds most of the cache files of some checksums (lower case), in, above or beside the
+    `folders`; None where none is found."""
+    held = Counter({place: n for place in _places(folders) if (n := len(_caches(place) & set(crcs)))})
+    return held.most_common(1)[0][0] if held else None
+
+
+def _places(folders: Iterable[Path]) -> Iterator[Path]:
+    for folder in folders:
+        start = folder.resolve()
+        for above in (start, *start.parents)[: _ABOVE + 1]:
+            yield above
+            yield from (Path(entry.path) for entry in _entries(above) if entry.is_dir())
+
+
+def _caches(folder: Path) -> set[str]:
+    """The checksums of the cache files in a folder, as their names tell."""
+    return {Path(entry.name).stem.lower() for entry in _entries(folder) if folders.is_cache(entry.name)}
+
+
+def _entries(folder: Path) -> list[os.DirEntry[str]]:
+    try:
+        with os.scandir(folder) as found:
+            return [entry for entry, _ in zip(found, range(_MOST), strict=False)]
+    except OSError:
+        return []
+
+
+# ----------------------------------------
+# A past mission through the same path as a live one, with a state of its own.
+
+# ----------------------------------------
 # The files of several gliders in the order of their sending: for a replay, whose time is theirs.
-
-LONGEST = 2 * 86400.0
-"""Seconds after which a file is sent at the latest: if the next is opened later, there was a pause."""
-
-
-class ReplayOrder:
-    """Puts decoded jobs, which come as their files were opened, into the order of their sending."""
-
-    def __init__(self, jobs: Iterable[Job]) -> None:
-        self._coming: dict[str, deque[float]] = {}
-        self._ready: dict[str, deque[Job]] = {}
-        for job in jobs:
-            self._coming.setdefault(job.header.id.glider, deque()).append(job.opened_at)
-            self._ready[job.header.id.glider] = deque()
-
-    def after(self, job: Job) -> Iterator[tuple[Job, float]]:
-        """The jobs whose turn it is once one more is decoded, each with the time (s) of its sending."""
-        self._coming[job.header.id.glider].popleft()
-        self._ready[job.header.id.glider].append(job)
-        while heads := [(self._sent(glider), glider) for glider, ready in self._ready.items() if ready]:
-            sent, first = min(heads)
-            if any(c and c[0] < sent and not self._ready[g] for g, c in self._coming.items()):
-                return  # a file that was opened before may have been sent before
-            yield self._ready[first].popleft(), sent
-
-    def _sent(self, glider: str) -> float:
-        """When the first file that is ready was sent: at its end, else before the next was opened."""
-        job, *later = self._ready[glider]
-        if isinstance(job.result, Segment):
-            return job.result.last_t + job.offset
-        opened = job.opened_at
-        coming = [*(j.opened_at for j in later), *self._coming[glider]]
-        return min(next(iter(coming), opened), opened + LONGEST)
 
 
 # ----------------------------------------
@@ -111,7 +178,7 @@ class Report:
     """What a replay found: files by status with reasons, and the store that holds the rest.
 
     ``clock`` is what time it is for each glider (s): that of its data. ``coming`` is when its files were
-    opened that are not taken yet (s).
+    opened that are not processed yet (s).
     """
 
     store: Store
@@ -126,7 +193,7 @@ def replay(
     request: Request,
     *,
     on_total: Callable[[int], None] = lambda n: None,
-    on_file: Callable[[transaction.FileOutcome], None] = lambda taken: None,
+    on_file: Callable[[transaction.FileOutcome], None] = lambda outcome: None,
     workers: int = 1,
 ) -> Report:
     """Replay the files of some folders in the order of time. Raises GliderwatchError where there are none."""
@@ -141,19 +208,19 @@ def replay(
         lists = SensorLists(Path(kept))
         ocean = None if request.config is None else OceanCache(request.config)
         report = Report(Store.open(path, durable=False), ocean)
-        with _speaking(request, path, report) as told:
-            jobs = _triage(files, report, lists, request, on_file)
+        with _delivery(request, path, report) as routing:
+            jobs = _judge_all(files, report, lists, request, on_file)
             calls = deque(read_logs(logs, report.store, request.is_wanted))
             _check_glider(request, jobs, calls, report.store)
             report.coming = _coming(jobs, calls)
-            turns = ReplayOrder(jobs)
+            order = ReplayOrder(jobs)
             for decoded in _decoded(jobs, [*cache_folders(request), lists.folder], workers):
-                for job, sent in turns.after(decoded):
+                for job, sent in order.after(decoded):
                     while calls and calls[0].sent <= sent:
-                        _take_log(calls.popleft(), report, request, told, on_file)
-                    _take(job, sent, report, request, told, on_file)
+                        _process_log(calls.popleft(), report, request, routing, on_file)
+                    _process(job, sent, report, request, routing, on_file)
             for call in calls:
-                _take_log(call, report, request, told, on_file)
+                _process_log(call, report, request, routing, on_file)
         if request.out is not None:
             _write(request.out, report.store)
     return report
@@ -218,8 +285,8 @@ def _fresh(path: Path, config: Config | None) -> Path:
 
 
 @contextmanager
-def _speaking(request: Request, path: Path | str, report: Report) -> Iterator[Routing]:
-    """Who is told: nobody, or with `send` whom the configuration says, until all is delivered."""
+def _delivery(request: Request, path: Path | str, report: Report) -> Iterator[Routing]:
+    """Who is notified: nobody, or with `send` whom the configuration says, until all is delivered."""
     if not request.send or request.config is None:
         yield NOBODY if request.config is None else _silent(request.config)
         return
@@ -246,11 +313,11 @@ def _silent(config: Config) -> Routing:
 
 def _at_once(config: Config) -> Routing:
     """As the configuration says, but nobody waits: what they would have waited for is past."""
-    told = routing_of(config)
-    return replace(told, channels=lambda alert: list(told.channels(alert)))
+    routing = routing_of(config)
+    return replace(routing, channels=lambda alert: list(routing.channels(alert)))
 
 
-def _triage(
+def _judge_all(
     files: Sequence[Path],
     report: Report,
     lists: SensorLists,
@@ -265,7 +332,7 @@ def _triage(
     jobs, noted = list[Job](), list[File]()
 
     def look(path: Path) -> None:
-        found = triage.triage(path, report.store, caches, request.is_wanted)
+        found = judgement.judge(path, report.store, caches, request.is_wanted)
         if isinstance(found, Job):
             lists.keep(path, found.header)
             jobs.append(found)
@@ -332,44 +399,50 @@ def _decoded(jobs: Sequence[Job], caches: Sequence[Path], workers: int) -> Itera
             yield job
 
 
-def _take(
+def _process(
     job: Job,
     sent: float,
     report: Report,
     request: Request,
-    told: Routing,
+    routing: Routing,
     on_file: Callable[[transaction.FileOutcome], None],
 ) -> None:
     """Let the clock run until a file was `sent` (s), and take it."""
     glider = job.header.id.glider
-    params, ticked = request.params(glider), _tick(report, told, sent)
+    params, ticked = request.params(glider), _tick(report, routing, sent)
     try:
         if not isinstance(job.result, Segment):
             raise job.result if job.result is not None else Retry("was not decoded")
         ocean = None if report.ocean is None else report.ocean.field(glider)
-        taken = transaction.process_file(report.store, job.file, job.result, params, told, sent, ocean=ocean)
+        outcome = transaction.process_file(
+            report.store, job.file, job.result, params, routing, sent, ocean=ocean
+        )
     except (Quarantine, Retry) as error:
-        taken = transaction.record_file(report.store, triage.failed(job.file, error), params, told, sent)
+        outcome = transaction.record_file(
+            report.store, judgement.failed(job.file, error), params, routing, sent
+        )
     report.coming[glider].popleft()
     report.clock[glider] = max(sent, report.clock.get(glider, sent))
-    _count(replace(taken, alerts=(*ticked, *taken.alerts)), report, on_file)
+    _count(replace(outcome, alerts=(*ticked, *outcome.alerts)), report, on_file)
 
 
-def _take_log(
+def _process_log(
     log: Log,
     report: Report,
     request: Request,
-    told: Routing,
+    routing: Routing,
     on_file: Callable[[transaction.FileOutcome], None],
 ) -> None:
     """Let the clock run until a call was over, and take its log."""
-    glider, is_taken = log.file.glider, log.file.status is Status.TAKEN
-    ticked = _tick(report, told, log.sent) if is_taken else []
-    taken = transaction.take_log(report.store, log.file, log.dialog, request.params(glider), told, log.sent)
-    if is_taken:
+    glider, is_read = log.file.glider, log.file.status is Status.TAKEN
+    ticked = _tick(report, routing, log.sent) if is_read else []
+    outcome = transaction.take_log(
+        report.store, log.file, log.dialog, request.params(glider), routing, log.sent
+    )
+    if is_read:
         report.coming[glider].popleft()
         report.clock[glider] = max(log.sent, report.clock.get(glider, log.sent))
-    _count(replace(taken, alerts=(*ticked, *taken.alerts)), report, on_file)
+    _count(replace(outcome, alerts=(*ticked, *outcome.alerts)), report, on_file)
 
 
 def _coming(jobs: Iterable[Job], calls: Iterable[Log]) -> dict[str, deque[float]]:
@@ -383,36 +456,36 @@ def _coming(jobs: Iterable[Job], calls: Iterable[Log]) -> dict[str, deque[float]
     return {glider: deque(sorted(times)) for glider, times in coming.items()}
 
 
-def _tick(report: Report, told: Routing, until: float) -> list[Alert]:
-    """What a daemon would have said of the silence of all gliders until a time (s), in its order.
+def _tick(report: Report, routing: Routing, until: float) -> list[Alert]:
+    """What a daemon would have reported of all gliders that stay away until a time (s), in its order.
 
     Nothing between two deployments, nor after the last file: a replay knows that a deployment has ended.
     """
     store, alerts = report.store, list[Alert]()
     while True:
-        due = {g: t for g in report.clock if (t := _due(g, report, told, until)) is not None}
+        due = {g: t for g in report.clock if (t := _due(g, report, routing, until)) is not None}
         if not due:
             return alerts
         glider = min(due, key=lambda g: (due[g], g))
-        others = [g for g in store.gliders() if g != glider and not told.attention(g).recovered]
-        alerts += transaction.tick(store, glider, told, others, due[glider])
+        others = [g for g in store.gliders() if g != glider and not routing.attention(g).recovered]
+        alerts += transaction.tick(store, glider, routing, others, due[glider])
         report.clock[glider] = due[glider]
 
 
-def _due(glider: str, report: Report, told: Routing, until: float) -> float | None:
-    """When there is something to say next of a glider's silence, if that is before `until` (s)."""
+def _due(glider: str, report: Report, routing: Routing, until: float) -> float | None:
+    """When there is a message about a glider that stays away, if that is before `until` (s)."""
     now, coming = report.clock[glider], report.coming[glider]
     if not coming or coming[0] - now >= GONE:
         return None
-    at = transaction.next_tick(report.store, glider, told, now)
+    at = transaction.next_tick(report.store, glider, routing, now)
     return at if at is not None and now < at <= until else None
 
 
 def _count(
-    taken: transaction.FileOutcome, report: Report, on_file: Callable[[transaction.FileOutcome], None]
+    outcome: transaction.FileOutcome, report: Report, on_file: Callable[[transaction.FileOutcome], None]
 ) -> None:
-    report.files[taken.file.status] += 1
-    on_file(taken)
+    report.files[outcome.file.status] += 1
+    on_file(outcome)
 
 
 def _write(out: Path, store: Store) -> None:

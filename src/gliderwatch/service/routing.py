@@ -24,7 +24,7 @@ class Routing:
 
 
 # ----------------------------------------
-# Who is told what: from the recipients of the configuration to the channels of an alert.
+# Who gets what: from the recipients of the configuration to the channels of an alert.
 
 NOBODY = Routing(channels=lambda alert: (), notices=lambda glider: False)
 Waits = dict[str, list[Wait]]
@@ -90,8 +90,8 @@ def post_alert(
     """
 
     def standing(channel: str) -> Standing:
-        told, escalates = store.standing(alert.incident, channel, now)
-        return Standing(told, alert.incident in open_threads, escalates)
+        delivered, escalates = store.standing(alert.incident, channel, now)
+        return Standing(delivered, alert.incident in open_threads, escalates)
 
     store.post(alert, deliveries(alert, channels, now, standing), now)
 

@@ -1,126 +1,23 @@
-"""What to do with a file that has come (decode it, wait, or leave it alone), and the queue of files for the
-decoder."""
+"""What a file that has come is to be: read by its header alone, or a log to its end so far.
+
+A flight file is to be decoded, waits, or is left alone; a log of a call is read at once.
+"""
 
 from __future__ import annotations
 
-import heapq
-from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import chain
+from dataclasses import replace
 from pathlib import Path
 
 from gliderwatch.errors import MissingCache, NotAssessed, Quarantine, Retry
-from gliderwatch.model import Hindrance, Segment
+from gliderwatch.model import Hindrance
+from gliderwatch.service.backlog import Job
 from gliderwatch.slocum.caches import is_there
 from gliderwatch.slocum.calls import Dialog, read_log
-from gliderwatch.slocum.folders import Settling
-from gliderwatch.slocum.header import Header, read_header
+from gliderwatch.slocum.header import read_header
 from gliderwatch.slocum.science import needs_science, science_files
 from gliderwatch.store.codec import plain_decode
 from gliderwatch.store.state_file import File, Status, Store
-
-# ----------------------------------------
-# Files on their way from settled to taken: in order within a glider, in turn between gliders.
-
-AHEAD = 16
-"""Files of one glider that may be decoded, or done with it, before the first of them is taken."""
-
-
-@dataclass(slots=True)
-class Job:
-    """A file to decode, ``begun`` (s, monotonic); ``result`` is there once it is decoded or has failed.
-
-    ``offset`` is what is to be added to the glider's clock (s), as far as headers tell.
-    """
-
-    file: File
-    header: Header
-    result: Segment | Exception | None = None
-    begun: float | None = None
-    offset: float = 0.0
-
-    @property
-    def opened_at(self) -> float:
-        """When the file was opened (s), by a clock that is right."""
-        return self.header.id.opened_at + self.offset
-
-
-@dataclass(slots=True)
-class _Queue:
-    waiting: list[tuple[float, str, str, Job]] = field(default_factory=list)
-    decoding: deque[Job] = field(default_factory=deque)
-
-
-class Backlog:
-    """Oldest first within each glider, so that nothing has to be taken back; gliders take turns.
-
-    One glider with a month of files delays no other: one that had none at hand is next. A file that takes
-    long to decode delays its own glider alone. ``decoding`` counts the files that are being decoded.
-    """
-
-    def __init__(self) -> None:
-        self._queues: OrderedDict[str, _Queue] = OrderedDict()
-        self._new: dict[str, None] = {}
-        self._paths: set[str] = set()
-        self.decoding = 0
-
-    def __len__(self) -> int:
-        return len(self._paths)
-
-    def add(self, job: Job) -> None:
-        """Put a file into the queue of its glider; one that is there already stays as it is."""
-        if job.file.path in self._paths:
-            return
-        self._paths.add(job.file.path)
-        glider = job.header.id.glider
-        if glider not in self._queues:  # a file that just came does not wait for a round of all gliders
-            self._queues[glider] = _Queue()
-            self._new[glider] = None
-        queue = self._queues[glider]
-        heapq.heappush(queue.waiting, (job.header.id.opened_at, job.header.id.name, job.file.path, job))
-
-    def next(self) -> Job | None:
-        """The file to decode next, None when there is none."""
-        for glider in chain(self._new, self._queues):
-            queue = self._queues[glider]
-            if queue.waiting and len(queue.decoding) < AHEAD:
-                job = heapq.heappop(queue.waiting)[-1]
-                queue.decoding.append(job)
-                self._queues.move_to_end(glider)
-                self._new.pop(glider, None)
-                self.decoding += 1
-                return job
-        return None
-
-    def finish(self, job: Job, result: Segment | Exception) -> None:
-        """Note what became of a file that was being decoded."""
-        job.result = result
-        self.decoding -= 1
-
-    def decoded(self, glider: str) -> Job | None:
-        """The next file of a glider to take, which leaves: decoded, and none before it is still in work."""
-        queue = self._queues.get(glider)
-        if queue is None or not queue.decoding or queue.decoding[0].result is None:
-            return None
-        job = queue.decoding.popleft()
-        self._paths.discard(job.file.path)
-        if not queue.waiting and not queue.decoding:
-            del self._queues[glider]
-        return job
-
-    def more(self, glider: str) -> bool:
-        """Whether more files of a glider are at hand."""
-        return glider in self._queues
-
-    def behind(self, glider: str) -> int:
-        """How many more files of a glider are at hand."""
-        queue = self._queues.get(glider)
-        return 0 if queue is None else len(queue.waiting) + len(queue.decoding)
-
-
-# ----------------------------------------
-# What to do with a file that has come: let it settle; once complete, decode it, wait, or leave it alone.
 
 DONE = (Status.TAKEN, Status.DUPLICATE, Status.QUARANTINED)
 
@@ -134,22 +31,6 @@ def state(path: Path) -> tuple[int, int] | None:
     except OSError:
         return 0, 0
     return status.st_size, status.st_mtime_ns
-
-
-def observe(path: Path, settling: Settling, now: float) -> None:
-    """Let a file settle that has changed; `now` is monotonic (s)."""
-    try:
-        status = path.lstat()
-    except OSError:  # gone or renamed: its new name is news of its own
-        settling.forget(path)
-        return
-    settling.observe(path, status.st_size, status.st_mtime_ns, now)
-
-
-def settle_again(path: Path, settling: Settling, now: float) -> None:
-    """Let a file settle as if nothing were known of it; `now` is monotonic (s)."""
-    settling.forget(path)
-    observe(path, settling, now)
 
 
 def lacks_depth(flight: Path, store: Store, caches: Sequence[Path]) -> bool:
@@ -174,23 +55,23 @@ def newer_science(flight: Path, store: Store) -> list[Path]:
         return []
 
 
-def triage(
+def judge(
     path: Path,
     store: Store,
     caches: Sequence[Path],
     is_known: Callable[[str], bool],
     *,
-    anew: bool = False,
+    again: bool = False,
 ) -> Job | File | None:
     """A job where the file is to be decoded, a row for the ledger where not, None where nothing is new.
 
-    Reads nothing but the header, which takes well under a millisecond. `anew`: also one that is done with.
+    Reads nothing but the header, which takes well under a millisecond. `again`: also one that is done with.
     """
     now, before = state(path), store.file(_text(path))
     if now is None:
         return _gone(before, store, is_known)
     is_same = before is not None and (before.size, before.mtime_ns) == now
-    if before is not None and is_same and not anew and _is_settled(before, caches, is_known):
+    if before is not None and is_same and not again and _is_settled(before, caches, is_known):
         return None
     file = File(_text(path), *now, Status.WAITING)
     try:
