@@ -1,4 +1,4 @@
-"""Maps and plots: the coast is where it is, what is drawn is what was given, and it stands in a strict page."""
+"""Maps and plots: the coast is where it is, what is drawn is what was given, and stands in a strict page."""
 
 from __future__ import annotations
 
@@ -94,7 +94,11 @@ def test_every_place_is_in_the_picture_and_every_label_escaped():
     xy = np.array([[float(n) for n in re.findall(r"[\d.]+", text)] for text in at])
     assert len(xy) == 3
     assert ((xy > 0) & (xy < [chart.WIDTH, chart.HEIGHT])).all()
-    assert [t.text for t in svg.iter("text") if t.text and t.text.startswith("<g")] == ["<g0>", "<g1>", "<g2>"]
+    assert [t.text for t in svg.iter("text") if t.text and t.text.startswith("<g")] == [
+        "<g0>",
+        "<g1>",
+        "<g2>",
+    ]
 
 
 def test_the_scale_bar_is_as_long_as_it_says():

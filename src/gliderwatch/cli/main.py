@@ -11,6 +11,7 @@ from gliderwatch import __version__
 from gliderwatch.cli.look import LOOKING
 from gliderwatch.cli.manage import COMMANDS
 from gliderwatch.cli.options import Group
+from gliderwatch.cli.pages import pages
 from gliderwatch.cli.run import run
 from gliderwatch.cli.score import score
 from gliderwatch.cli.simulate import simulate
@@ -25,5 +26,5 @@ def main() -> None:
             stream.reconfigure(errors="replace")
 
 
-for command in (run, *LOOKING, *COMMANDS, simulate, score):
+for command in (run, *LOOKING, *COMMANDS, pages, simulate, score):
     main.add_command(command)

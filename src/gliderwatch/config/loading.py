@@ -22,6 +22,7 @@ from gliderwatch.config.schema import (
     Metrics,
     Ocean,
     Operator,
+    Pages,
     Preset,
     Recipient,
     Settings,
@@ -53,6 +54,7 @@ class Config(Section):
     operator: Operator = Field(default=Operator(), description="When the operator is told.")
     heartbeat: Heartbeat = Field(default=Heartbeat(), description="For a dead man's switch.")
     metrics: Metrics = Field(default=Metrics(), description="For Prometheus.")
+    pages: Pages = Field(default=Pages(), description="Pages for pilots as files.")
     _document: Document = PrivateAttr(Document(Path("configuration"), None, {}))
     _presets: Mapping[str, Preset] = PrivateAttr(default_factory=dict)
     _known: dict[str, Settings] = PrivateAttr(default_factory=dict)

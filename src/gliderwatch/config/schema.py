@@ -355,6 +355,15 @@ class Operator(Section):
     )
 
 
+class Pages(Section):
+    """Pages for pilots as files: of the fleet and of each glider, for any web server."""
+
+    folder: AbsolutePath | None = Field(
+        default=None,
+        description="The folder in which they are kept up to date; made if need be. null: none are written.",
+    )
+
+
 class Channel(Section):
     """One way to send messages."""
 

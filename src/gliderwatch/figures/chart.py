@@ -36,7 +36,8 @@ ARROW = 60.0
 LONGEST = 50.0
 STYLE = """\
 .map{background:var(--sea);font:12px system-ui,sans-serif}.map text{fill:var(--ink)}
-.map .land{fill:var(--land);stroke:var(--shore);stroke-width:.8}.map .grid{stroke:var(--ink);stroke-opacity:.18;fill:none}.map .faint{
+.map .land{fill:var(--land);stroke:var(--shore);stroke-width:.8}
+.map .grid{stroke:var(--ink);stroke-opacity:.18;fill:none}.map .faint{
 fill-opacity:.65;font-size:10px}.map .track{fill:none;stroke:var(--quiet);stroke-width:1.5}.map .current{
 stroke:var(--ok);stroke-width:1.4;fill:none}.map .area{fill:var(--warn);fill-opacity:.13;stroke:var(--warn);
 stroke-width:1.4;stroke-dasharray:5 3}.map .next{fill:var(--ok);fill-opacity:.13;stroke:var(--ok);

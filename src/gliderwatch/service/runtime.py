@@ -20,6 +20,7 @@ from gliderwatch.errors import GliderwatchError
 from gliderwatch.model import Segment
 from gliderwatch.sea.ocean_field import Field
 from gliderwatch.service.backlog import Backlog, Job
+from gliderwatch.service.page_writer import PagesWritten
 from gliderwatch.service.routing import Routing, routing_of
 from gliderwatch.slocum.caches import SensorLists, lists_folder
 from gliderwatch.slocum.decode import Decoder
@@ -93,7 +94,7 @@ class Decoded:
         return error if isinstance(error, Exception) else self.future.result()
 
 
-News = Change | Decoded | signal.Signals
+News = Change | Decoded | PagesWritten | signal.Signals
 
 
 @dataclass(frozen=True, slots=True)
