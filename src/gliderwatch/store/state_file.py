@@ -86,6 +86,7 @@ class Store:
                 self.segments.ahead.commit()
             except BaseException:
                 self.segments.ahead.rollback()
+                self.segments.clocks.clear()
                 if self._db.in_transaction:  # on a full disk SQLite may have ended it by itself
                     self._db.execute("ROLLBACK")
                 raise
@@ -145,12 +146,14 @@ class Store:
 
     def is_past(self, identity: SegmentId) -> bool:
         """Whether a segment is older than what is kept of its glider (`state.keep_days`)."""
-        opened_at = identity.opened_at + segments.offset(self._db, identity)
+        opened_at = identity.opened_at + self.segments.clocks.offset(identity)
         return retention.is_past(self._db, replace(identity, opened_at=opened_at))
 
     def remove(self, before: float) -> Iterator[int]:
         """`retention.remove` of all gliders, in steps."""
-        return retention.remove(self._db, self.transaction, self.gliders(), before)
+        for removed in retention.remove(self._db, self.transaction, self.gliders(), before):
+            self.segments.clocks.clear()
+            yield removed
 
     # ----------------------------------------------------------------- results
 
