@@ -46,7 +46,7 @@ def test_pages_follow_each_file_and_a_stopped_drawer_holds_up_nothing(site: Site
         put(site, *FILES[6:7])
         taken(site, *FILES[6:7])
         until(lambda: (folder / "index.html").stat().st_mtime_ns > before, "written again")
-    assert not list(folder.glob("*.html.*"))
+    assert not list(folder.glob("*.part"))
 
 
 def test_pages_of_a_replay_are_written_by_command(site: Site, tmp_path: Path) -> None:
@@ -70,3 +70,20 @@ def test_pages_are_not_written_on_the_dockserver(site: Site) -> None:
     result = command("run", "-c", site.config)
     assert result.returncode == 2
     assert "pages.folder: lies below the root" in result.stderr
+
+
+def test_what_is_known_is_exported_by_command(site: Site, tmp_path: Path) -> None:
+    put(site, *FILES)
+    out = tmp_path / "out"
+    command("run", "--replay", site.root, "--cache", site.cache, "--out", out)
+    state = ("--state", out / "replay.sqlite")
+    found = command("export", "--format", "geojson", *state)
+    assert json.loads(found.stdout)["type"] == "FeatureCollection"
+    assert command("export", "angus", "--format", "netcdf", "--out", out / "a.nc", *state).returncode == 0
+    assert (out / "a.nc").read_bytes().startswith(b"\x89HDF")
+    told = command("where", "angus", *state)
+    assert "95 % within" in told.stdout
+    told = command("where", "nobody", *state)
+    assert told.stderr.startswith("nothing is known of a glider nobody; known are: angus")
+    assert command("where", "angus", "--ais", "992441234", *state).stdout.startswith("!AIVDM,1,1,")
+    assert command("where", "--ais", "992441234", *state).returncode == 2

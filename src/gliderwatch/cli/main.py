@@ -8,6 +8,7 @@ import sys
 import click
 
 from gliderwatch import __version__
+from gliderwatch.cli.export import COMMANDS as EXPORTING
 from gliderwatch.cli.look import LOOKING
 from gliderwatch.cli.manage import COMMANDS
 from gliderwatch.cli.options import Group
@@ -26,5 +27,5 @@ def main() -> None:
             stream.reconfigure(errors="replace")
 
 
-for command in (run, *LOOKING, *COMMANDS, pages, simulate, score):
+for command in (run, *LOOKING, *COMMANDS, *EXPORTING, pages, simulate, score):
     main.add_command(command)

@@ -65,14 +65,14 @@ class Plot:
     svg: Markup
 
 
-def file_of(glider: str, kind: str = "") -> str:
-    """The name of the file of a glider's page: its own, where that can be one.
+def file_of(glider: str, kind: str = "", ending: str = "html") -> str:
+    """The name of a file of a glider: its own, where that can be one.
 
     >>> file_of("electa"), file_of("unit_1033", "-sheet"), file_of("../a b")
     ('electa.html', 'unit_1033-sheet.html', '%2E%2E%2Fa%20b.html')
     """
     name = glider if re.fullmatch(r"[\w-]+", glider, re.ASCII) else quote(glider, safe="").replace(".", "%2E")
-    return f"{'glider-' if name == 'index' else ''}{name}{kind}.html"
+    return f"{'glider-' if name in {'index', 'gliders'} else ''}{name}{kind}.{ending}"
 
 
 def _href(file: str) -> str:

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.figures.coast import world
-from gliderwatch.pages.reading import read_fleet, read_glider
+from gliderwatch.pages.reading import read_fleet
 from gliderwatch.pages.render import Frame, file_of, fleet_page, glider_page, sheet_page
+from gliderwatch.pages.view import GliderView
 from gliderwatch.params import Attention
 from gliderwatch.store.state_file import Store
 
@@ -20,23 +21,17 @@ LEFT_OVER = 3600.0
 """Seconds after which what a killed writer left is removed."""
 
 
-def write_fleet(
-    store: Store, folder: Path, attention: dict[str, Attention], now: float, due: float | None = None
-) -> None:
+def write_fleet(store: Store, folder: Path, attention: dict[str, Attention], now: float) -> None:
     """Write the page of all gliders, those of `attention`. Raises GliderwatchError where that cannot be."""
     views = read_fleet(store, sorted(attention), lambda name: attention[name], now)
-    frame = Frame(now, now + FLEET_DUE if due is None else due)
-    put(folder / FLEET, fleet_page(views, frame, world()))
+    put(folder / FLEET, fleet_page(views, Frame(now, now + FLEET_DUE), world()))
 
 
-def write_glider(
-    store: Store, folder: Path, name: str, attention: Attention, now: float, due: float | None = None
-) -> None:
+def write_glider(view: GliderView, folder: Path) -> None:
     """Write the pages of one glider. Raises GliderwatchError where that cannot be."""
-    view = read_glider(store, name, attention, now)
-    frame = Frame(now, now + GLIDER_DUE if due is None else due)
-    put(folder / file_of(name), glider_page(view, frame, world()))
-    put(folder / file_of(name, "-sheet"), sheet_page(view, frame, world()))
+    frame = Frame(view.now, view.now + GLIDER_DUE)
+    put(folder / file_of(view.name), glider_page(view, frame, world()))
+    put(folder / file_of(view.name, "-sheet"), sheet_page(view, frame, world()))
 
 
 def put(path: Path, text: str) -> None:

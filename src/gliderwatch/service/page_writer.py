@@ -11,12 +11,16 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import structlog
 from pebble import ProcessPool
 
 from gliderwatch.config import Config
 from gliderwatch.params import Attention
+
+if TYPE_CHECKING:
+    from gliderwatch.store.state_file import Store
 
 log = structlog.get_logger(__name__)
 
@@ -43,20 +47,44 @@ class PagesWritten:
 
 
 def write(job: PageJob) -> None:
-    """Write the pages of a job. Raises GliderwatchError."""
-    from gliderwatch.pages import writing  # noqa: PLC0415 (never in the daemon: it draws)
-    from gliderwatch.store.state_file import Store  # noqa: PLC0415
+    """Write the pages of a job, and what lies beside them for other programs. Raises GliderwatchError."""
+    from gliderwatch.store.state_file import Store
 
     store, now = Store.reading(job.state), time.time()
     try:
         with store.guarded():
             if job.glider:
-                writing.write_glider(store, job.folder, job.glider, job.attention[job.glider], now)
+                write_glider(store, job.folder, job.glider, job.attention[job.glider], now)
             else:
-                writing.clear(job.folder, now)
-                writing.write_fleet(store, job.folder, job.attention, now)
+                write_fleet(store, job.folder, job.attention, now)
     finally:
         store.close()
+
+
+# ruff: noqa: PLC0415
+# Nothing that draws is loaded in the daemon, which imports this module too.
+
+
+def write_fleet(store: Store, folder: Path, attention: dict[str, Attention], now: float) -> None:
+    """Write what is of all gliders, those of `attention`, as known at `now` (s). Raises GliderwatchError."""
+    from gliderwatch.export import maps
+    from gliderwatch.pages import render, writing
+
+    writing.clear(folder, now)
+    writing.write_fleet(store, folder, attention, now)
+    links = [render.file_of(name, ending="kml") for name in store.gliders()]
+    writing.put(folder / "gliders.kml", maps.as_kml_link(links))
+
+
+def write_glider(store: Store, folder: Path, name: str, attention: Attention, now: float) -> None:
+    """Write what is of one glider, as known at `now` (s). Raises GliderwatchError."""
+    from gliderwatch.export import maps
+    from gliderwatch.pages import reading, render, writing
+
+    view = reading.read_glider(store, name, attention, now)
+    writing.write_glider(view, folder)
+    writing.put(folder / render.file_of(name, ending="geojson"), maps.as_geojson((view,)))
+    writing.put(folder / render.file_of(name, ending="kml"), maps.as_kml((view,)))
 
 
 class PageWriter:
