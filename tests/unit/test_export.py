@@ -16,7 +16,7 @@ from pyais import decode
 
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.export import ais, dives, maps, netcdf
-from gliderwatch.messages.overdue_text import DriftEllipse
+from gliderwatch.incidents.notices import DriftEllipse
 from gliderwatch.params import Attention
 from unit.test_pages import HOSTILE, LATE, NOW, dive, view
 

@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gliderwatch.figures import chart, coast, dives, plots
-from gliderwatch.messages.overdue_text import DriftEllipse
-from gliderwatch.messages.samples import SAMPLES
-from gliderwatch.model import Assessment, Kind
+from gliderwatch.incidents.notices import DriftEllipse
+from gliderwatch.model import Assessment
 from gliderwatch.navigation.geodesy import to_plane
+from unit.test_pages import dive
 
 BOXES = coast.Box(24.0, 31.0, -88.0, -79.0), coast.Box(60.0, 70.0, 170.0, 200.0)
 
@@ -133,14 +133,9 @@ def test_the_outline_of_an_ellipse_has_its_axes():
 
 
 def some_dives() -> list[Assessment]:
-    """A sample's dive, four times, slower at the end; roll unknown on one."""
-    from gliderwatch.messages import samples
-
-    assert Kind.ANOMALY in SAMPLES
-    slow = samples._SLOW
-    made = [replace(slow, t_dive=k * 14400.0, t_surface=k * 14400.0 + 12000.0) for k in range(4)]
-    fast = [replace(d, flag=0, speed=0.25, evidence={**d.evidence, "speed_sigma": 0.02}) for d in made[:2]]
-    return [*fast, *made[2:]]
+    """Two dives at the usual speed, then two that are slow."""
+    slow = {"flag": 1, "speed": 0.12}
+    return [dive(14.0), dive(10.5), dive(7.0, **slow), dive(3.5, **slow)]
 
 
 def test_a_panel_stands_in_a_strict_page():

@@ -13,10 +13,10 @@ import pytest
 from gliderwatch.figures.coast import world
 from gliderwatch.incidents.aborts import Episode
 from gliderwatch.incidents.acknowledgement import acknowledge
+from gliderwatch.incidents.notices import AbortReport
 from gliderwatch.incidents.notifications import NotificationState
 from gliderwatch.incidents.overdue import ExpectedCall
 from gliderwatch.incidents.whereabouts import whereabouts
-from gliderwatch.messages.call_text import Told
 from gliderwatch.messages.samples import SAMPLES
 from gliderwatch.model import (
     Alert,
@@ -96,7 +96,7 @@ def incident(kind: Kind = Kind.ANOMALY, **changes: object) -> Incident:
 
 
 def aborted() -> NotificationState:
-    told = Told(Happening.ABORTING, NOW - HOUR, "LEAK", Severity.CRITICAL)
+    told = AbortReport(Happening.ABORTING, NOW - HOUR, "LEAK", Severity.CRITICAL)
     return NotificationState(aborts=(Episode("electa/abort/1", (told,), 1, NOW - HOUR),))
 
 

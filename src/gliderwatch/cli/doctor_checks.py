@@ -17,7 +17,7 @@ from typing import Any
 from gliderwatch.config import Config, Problem, expand
 from gliderwatch.delivery.channels import Channel, DeliveryError
 from gliderwatch.errors import ConfigError, DamagedError, GliderwatchError, MissingCache, StateError
-from gliderwatch.messages import incident_text
+from gliderwatch.messages import notice_text
 from gliderwatch.messages.formatting import clean, duration
 from gliderwatch.messages.samples import sample
 from gliderwatch.model import Alert, Kind, Severity
@@ -415,7 +415,7 @@ def try_channel(config: Config, name: str, alert: Alert | None = None) -> str | 
 
 
 def _test(name: str, now: float) -> Alert:
-    return incident_text.operator(
+    return notice_text.operator(
         "test of a channel",
         f"If you can read this, the channel {name} of gliderwatch works.",
         now,

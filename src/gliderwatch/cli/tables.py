@@ -13,6 +13,7 @@ from rich.text import Text
 from gliderwatch.cli.status import GliderStatus, IncidentEntry, Overview
 from gliderwatch.config import Problem
 from gliderwatch.incidents.acknowledgement import Ack
+from gliderwatch.messages import irregularity_text
 from gliderwatch.messages.formatting import clean, duration, utc
 from gliderwatch.model import Alert, Assessment, Flag, Incident, Kind, Severity
 from gliderwatch.service.jsonl import iso
@@ -132,7 +133,10 @@ def status(view: Overview, console: Console) -> None:
             console.print(Text(text + taken_on, style=_STYLES[i.severity]))
     for glider in view.gliders:
         for each in glider.irregularities:
-            console.print(Text(f"since {utc(each.t)}: {clean(each.title)}", style="yellow"), soft_wrap=True)
+            console.print(
+                Text(f"since {utc(each.t)}: {clean(irregularity_text.title(each))}", style="yellow"),
+                soft_wrap=True,
+            )
     files(view.files, [*view.waiting, *view.quarantined], console)
     for name, link in view.links.items():
         text = f"{clean(name, 30)}: {clean(str(link), 600)} ({clean(link.cure, 600)})"

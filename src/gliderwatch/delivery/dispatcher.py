@@ -16,7 +16,7 @@ from zlib import crc32
 import structlog
 
 from gliderwatch.delivery.channels import DeliveryError
-from gliderwatch.messages import incident_text
+from gliderwatch.messages import notice_text
 from gliderwatch.messages.template import escalated
 from gliderwatch.model import Alert, Severity
 
@@ -365,7 +365,7 @@ def _report_of(row: OutboxRow, error: str, now: float) -> Alert:
         "It is not tried again there, nor are others that are refused so; `gliderwatch status` lists them. "
         f"Correct the channel's URL, then try `gliderwatch test-alert --channel {row.channel}`."
     )
-    return incident_text.operator(
+    return notice_text.operator(
         f"channel {row.channel} refuses messages",
         text,
         now,

@@ -10,7 +10,7 @@ import re
 from datetime import UTC, datetime
 
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.messages.overdue_text import DriftEllipse
+from gliderwatch.incidents.notices import DriftEllipse
 
 ACCURATE = 10.0
 """Metres below which ITU-R M.1371 calls a position accurate."""

@@ -11,8 +11,8 @@ import msgspec
 
 from gliderwatch.export.dives import iso
 from gliderwatch.figures.chart import Place, outline
+from gliderwatch.incidents.notices import DriftEllipse
 from gliderwatch.messages.formatting import clean
-from gliderwatch.messages.overdue_text import DriftEllipse
 from gliderwatch.model import Assessment
 from gliderwatch.pages.view import GliderView, verdict
 

@@ -11,7 +11,7 @@ from math import asinh, atan, ceil, cos, degrees, floor, hypot, pi, radians, sin
 import numpy as np
 
 from gliderwatch.figures.coast import Box, Land, rings_in
-from gliderwatch.messages.overdue_text import DriftEllipse
+from gliderwatch.incidents.notices import DriftEllipse
 from gliderwatch.model import Array
 from gliderwatch.navigation.geodesy import from_plane, radii
 

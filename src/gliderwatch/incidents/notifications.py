@@ -13,10 +13,10 @@ from gliderwatch.incidents.aborts import Episode
 from gliderwatch.incidents.acknowledgement import Acks
 from gliderwatch.incidents.calls import Empty
 from gliderwatch.incidents.constants import FLOW_CHANGE, MARKS, NEWS, SLACK, SPEED_CHANGE, WEEK
+from gliderwatch.incidents.notices import Cleared, Corrected, Notice, Opened, StillOpen, Surfaced
 from gliderwatch.incidents.overdue import Silence
 from gliderwatch.incidents.unjudged import Unknown
-from gliderwatch.messages import incident_text
-from gliderwatch.model import Alert, Assessment, Incident, NextSurfacing
+from gliderwatch.model import Assessment, Incident, Kind, NextSurfacing, Severity
 
 # ----------------------------------------
 # What people have been told, compared with what is known: the messages that are due. Pure.
@@ -82,7 +82,7 @@ def due_notifications(
     reminder_hours: float | None,
     notices: bool,
     acks: Acks = NO_ACKS,
-) -> tuple[NotificationState, list[Alert]]:
+) -> tuple[NotificationState, list[Notice]]:
     """The messages to send now, and what will have been said then.
 
     `notices`: whether anyone wants a notice of each surfacing. An incident that somebody has acknowledged
@@ -92,7 +92,7 @@ def due_notifications(
     if latest is None:
         return said, []
     threads: list[Thread] = []
-    alerts: list[Alert] = []
+    alerts: list[Notice] = []
     incidents = known.incidents()
     matched = _matched(said.threads, incidents)
     for before in said.threads:
@@ -115,7 +115,11 @@ def due_notifications(
         expected = known.expected(float("inf"))
         if expected is not None and expected.after < latest.t_surface:
             expected = None  # of an earlier surfacing: the last dive cannot be used
-        alerts.append(incident_text.surfacing(latest, previous, alert_id=identity, expected=expected))
+        content = Surfaced(latest, previous, expected)
+        info = Severity.INFO
+        alerts.append(
+            Notice(identity, "", latest.glider, latest.t_surface, Kind.SURFACING, info, info, content)
+        )
         surfaced = latest.t_surface
     said = replace(said, threads=tuple(threads), surfaced=surfaced)
     return said, sorted(alerts, key=lambda a: a.time)
@@ -205,28 +209,23 @@ def _is_news(incident: Incident, latest: Assessment) -> bool:
 
 def _begun(
     incident: Incident, known: IncidentFacts, latest: Assessment, taken: set[str]
-) -> tuple[Thread, list[Alert]]:
+) -> tuple[Thread, list[Notice]]:
     identity = incident.id
     while identity in taken:
         identity += "+"
-    alert = incident_text.opened(
-        incident, incident.last, alert_id=f"{identity}/0", audience=incident.severity
-    )
-    alerts = [replace(alert, incident=identity)]
-    thread = Thread(identity, incident, incident.last, 1, latest.t_surface)
+    thread = Thread(identity, incident, incident.last, 0, latest.t_surface)
+    thread, alerts = _message(thread, Opened(incident, incident.last), latest)
     if incident.cleared_at is not None:
-        others = _still_open(incident, known)
-        thread, more = _message(
-            thread, incident, _clearing(incident, known), latest, "all_clear", others=others
-        )
+        thread, more = _message(thread, _cleared(incident, known), latest)
         alerts += more
     return thread, alerts
 
 
-def _clearing(incident: Incident, known: IncidentFacts) -> Assessment:
-    """The dive that cleared an incident."""
+def _cleared(incident: Incident, known: IncidentFacts) -> Cleared:
+    """That an incident is over, with the dive that cleared it and the incidents that go on."""
     dive = known.last_surfacing(incident.cleared_at if incident.cleared_at is not None else float("inf"))
-    return dive if dive is not None else incident.last
+    others = tuple(i for i in known.incidents() if i.id != incident.id and i.cleared_at is None)
+    return Cleared(incident, dive if dive is not None else incident.last, others)
 
 
 def _continued(
@@ -235,26 +234,26 @@ def _continued(
     known: IncidentFacts,
     latest: Assessment,
     reminder_hours: float | None,
-) -> tuple[Thread, list[Alert]]:
+) -> tuple[Thread, list[Notice]]:
     """One thread after what is known now, and its messages."""
     dive = known.dive(thread.dive.t_dive) or known.last_surfacing(thread.dive.t_surface) or latest
     if now is None:
         if thread.withdrawn:
             return thread, []
-        told, alerts = _message(thread, None, dive, latest, "correction", _why(thread, dive))
+        content = Corrected(thread.told, None, dive, _why(thread, dive))
+        told, alerts = _message(thread, content, latest)
         return replace(told, withdrawn=True), alerts
     was_clear, is_clear = thread.told.cleared_at is not None, now.cleared_at is not None
     if is_clear and not was_clear and not thread.withdrawn:
-        return _message(
-            thread, now, _clearing(now, known), latest, "all_clear", others=_still_open(now, known)
-        )
+        return _message(thread, _cleared(now, known), latest)
     moved = now.since != thread.told.since or now.cleared_at != thread.told.cleared_at
     if moved or thread.withdrawn or _changed(thread.dive, dive):
-        return _message(thread, now, dive, latest, "correction", _why(thread, dive))
+        return _message(thread, Corrected(thread.told, now, dive, _why(thread, dive)), latest)
     if not is_clear and reminder_hours is not None:
         before, age = ((t - now.opened_at) / 3600 / reminder_hours for t in (thread.time, latest.t_surface))
         if age >= next_reminder(before):
-            return _message(thread, now, latest, latest, "reminder")
+            hours = (latest.t_surface - now.since) / 3600
+            return _message(thread, StillOpen(now, latest, hours), latest)
     return thread, []
 
 
@@ -288,32 +287,20 @@ def _why(thread: Thread, now: Assessment) -> str:
     return "data that came late changed the dives before"
 
 
-def _still_open(incident: Incident, known: IncidentFacts) -> tuple[Incident, ...]:
-    """The other incidents of the glider that go on."""
-    return tuple(i for i in known.incidents() if i.id != incident.id and i.cleared_at is None)
-
-
 def _message(
-    thread: Thread,
-    now: Incident | None,
-    dive: Assessment,
-    latest: Assessment,
-    what: str,
-    why: str = "",
-    others: tuple[Incident, ...] = (),
-) -> tuple[Thread, list[Alert]]:
-    """The thread after one more message, about a `dive`, and the message."""
-    alert_id, audience = f"{thread.id}/{thread.messages}", thread.told.severity
-    if what == "correction":
-        alert = incident_text.correction(thread.told, now, dive, why, alert_id=alert_id, audience=audience)
-    elif what == "all_clear" and now is not None:
-        alert = incident_text.all_clear(now, dive, alert_id=alert_id, audience=audience, others=others)
-    else:
-        assert now is not None
-        hours = (dive.t_surface - now.since) / 3600
-        alert = incident_text.reminder(now, dive, hours, alert_id=alert_id, audience=audience)
-    told = Thread(thread.id, now or thread.told, dive, thread.messages + 1, latest.t_surface)
-    return told, [replace(alert, incident=thread.id)]
+    thread: Thread, content: Opened | StillOpen | Cleared | Corrected, latest: Assessment
+) -> tuple[Thread, list[Notice]]:
+    """The thread after one more message, and the message."""
+    dive, before = content.dive, thread.told
+    now = content.now if isinstance(content, Corrected) else content.incident
+    severity = Severity.INFO if now is None or isinstance(content, Cleared) else now.severity
+    kinds = {StillOpen: Kind.REMINDER, Cleared: Kind.ALL_CLEAR, Corrected: Kind.CORRECTION}
+    kind = kinds.get(type(content), before.kind)
+    identity = f"{thread.id}/{thread.messages}"
+    notice = Notice(
+        identity, thread.id, dive.glider, dive.t_surface, kind, severity, before.severity, content
+    )
+    return Thread(thread.id, now or before, dive, thread.messages + 1, latest.t_surface), [notice]
 
 
 # ----------------------------------------

@@ -7,8 +7,8 @@ from math import atan2, degrees, sqrt
 import numpy as np
 
 from gliderwatch.forecast.constants import CHI2_COVERED, GPS_ERROR
+from gliderwatch.incidents.notices import DriftEllipse
 from gliderwatch.incidents.overdue import drift
-from gliderwatch.messages.overdue_text import DriftEllipse
 from gliderwatch.model import Array, NextSurfacing
 from gliderwatch.navigation.geodesy import from_plane, to_plane
 

@@ -52,7 +52,7 @@ _HTML = Environment(
 class Page:
     """A message before it has a form: paragraphs, labelled facts, lists under headings.
 
-    The fact labelled ``Map`` is a link, made by `words.map_link` and of numbers only.
+    The fact labelled ``Map`` is a link, made by `formatting.map_link` and of numbers only.
     """
 
     lead: tuple[str, ...]
@@ -69,6 +69,10 @@ class Page:
     def html(self, title: str) -> str:
         """The page as HTML without tables, every value escaped."""
         return _HTML.render(title=title, page=self)
+
+
+Text = tuple[str, Page]
+"""A message's title and what it says."""
 
 
 def with_lead(html: str, line: str) -> str:

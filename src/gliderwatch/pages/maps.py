@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gliderwatch.figures.chart import Arrow, Chart, Mark
+from gliderwatch.incidents.notices import DriftEllipse
 from gliderwatch.messages.formatting import clean
-from gliderwatch.messages.overdue_text import DriftEllipse
 from gliderwatch.model import Assessment, Flag
 from gliderwatch.pages.view import GliderView, Verdict, verdict
 

@@ -7,12 +7,11 @@ from dataclasses import dataclass, field
 
 from gliderwatch.incidents.acknowledgement import Acks
 from gliderwatch.incidents.constants import GONE
+from gliderwatch.incidents.notices import DriftEllipse
 from gliderwatch.incidents.notifications import NotificationState
-from gliderwatch.incidents.overdue import ExpectedCall
+from gliderwatch.incidents.overdue import ExpectedCall, current
 from gliderwatch.incidents.whereabouts import whereabouts
-from gliderwatch.messages import overdue_text
 from gliderwatch.messages.formatting import INCIDENTS, clean, duration, speed, utc
-from gliderwatch.messages.overdue_text import DriftEllipse
 from gliderwatch.model import Alert, Assessment, Call, Fix, Incident, Kind, NextSurfacing
 from gliderwatch.params import Attention
 
@@ -69,8 +68,7 @@ class GliderView:
     @property
     def flow(self) -> tuple[float, float] | None:
         """The last known current (east, north; m/s)."""
-        u, v = overdue_text.current(self.latest) if self.latest is not None else (None, None)
-        return None if u is None or v is None else (u, v)
+        return None if self.latest is None else current(self.latest)
 
     @property
     def is_over(self) -> bool:

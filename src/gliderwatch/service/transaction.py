@@ -10,9 +10,10 @@ from gliderwatch.incidents import aborts, irregularities, overdue, unjudged
 from gliderwatch.incidents import calls as without_files
 from gliderwatch.incidents.acknowledgement import with_mute
 from gliderwatch.incidents.constants import GONE
+from gliderwatch.incidents.notices import Fleet, Notice
 from gliderwatch.incidents.notifications import NotificationState, due_notifications
 from gliderwatch.incidents.send_schedule import AT_ONCE, Wait
-from gliderwatch.messages.overdue_text import Fleet
+from gliderwatch.messages.notice_text import render
 from gliderwatch.model import Alert, Assessment, Segment, SegmentId
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
@@ -125,11 +126,12 @@ def tick(
     with store.transaction():
         said, hours = store.said(glider), speaking.attention(glider).overdue_hours
         fleet = replace(_fleet(store, others, now), back=_back(store, said.silences))
-        silences, alerts = overdue.tick(said.silences, store.known(glider), fleet, hours, now)
+        silences, due = overdue.tick(said.silences, store.known(glider), fleet, hours, now)
+        alerts = tuple(map(render, due))
         if silences != said.silences:
             channels = _channels(store, silences, speaking)
             post_alerts(store, glider, replace(said, silences=silences), alerts, channels, now)
-    return tuple(alerts)
+    return alerts
 
 
 def _fleet(store: Store, others: Iterable[str], now: float) -> Fleet:
@@ -219,12 +221,12 @@ def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: 
 
 def _speak_of_calls(
     said: NotificationState, known: GliderFacts, now: float
-) -> tuple[NotificationState, list[Alert]]:
+) -> tuple[NotificationState, list[Notice]]:
     """What is to be said of what a glider told in its calls."""
     calls = known.calls(now - GONE)
-    episodes, alerts = aborts.announce(known.glider, said.aborts, calls, now)
+    episodes, notices = aborts.announce(known.glider, said.aborts, calls, now)
     empty, more = without_files.announce(known.glider, said.empty, calls, known.signs(now - GONE), now)
-    return replace(said, aborts=episodes, empty=empty), [*alerts, *more]
+    return replace(said, aborts=episodes, empty=empty), [*notices, *more]
 
 
 def _due_messages(
@@ -238,19 +240,18 @@ def _due_messages(
         return ()
     before, known = store.said(glider), store.known(glider)
     silences, heard = overdue.on_calls(before.silences, known, now)
-    said, alerts = due_notifications(
+    said, of_incidents = due_notifications(
         replace(before, silences=silences),
         known,
         params.rules.reminder_hours,
         speaking.notices(glider),
         store.notes.acks(glider),
     )
-    blind, more = unjudged.announce(said.unknown, known, attention, params.rules.reminder_hours, now)
-    ids, notices = irregularities.due(before.irregularities, known.irregularities(now), now)
+    blind, of_watch = unjudged.announce(said.unknown, known, attention, params.rules.reminder_hours, now)
+    ids, of_files = irregularities.due(before.irregularities, known.irregularities(now), now)
     said = replace(said, unknown=blind, irregularities=ids)
-    alerts = [*heard, *notices, *alerts, *more]
-    said, more = _speak_of_calls(said, known, now)
-    alerts += more
+    said, of_calls = _speak_of_calls(said, known, now)
+    alerts = tuple(map(render, (*heard, *of_files, *of_incidents, *of_watch, *of_calls)))
     if said != before or alerts:
         post_alerts(store, glider, said, alerts, _channels(store, before.silences, speaking), now)
-    return tuple(alerts)
+    return alerts
