@@ -16,6 +16,7 @@ from gliderwatch.cli.pages import pages
 from gliderwatch.cli.run import run
 from gliderwatch.cli.score import score
 from gliderwatch.cli.simulate import simulate
+from gliderwatch.cli.web import web
 
 
 @click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"]})
@@ -27,5 +28,5 @@ def main() -> None:
             stream.reconfigure(errors="replace")
 
 
-for command in (run, *LOOKING, *COMMANDS, *EXPORTING, pages, simulate, score):
+for command in (run, *LOOKING, *COMMANDS, *EXPORTING, pages, web, simulate, score):
     main.add_command(command)

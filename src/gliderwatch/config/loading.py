@@ -27,6 +27,7 @@ from gliderwatch.config.schema import (
     Recipient,
     Settings,
     State,
+    Web,
 )
 from gliderwatch.errors import ConfigError
 from gliderwatch.params import Attention, GliderParams
@@ -55,6 +56,7 @@ class Config(Section):
     heartbeat: Heartbeat = Field(default=Heartbeat(), description="For a dead man's switch.")
     metrics: Metrics = Field(default=Metrics(), description="For Prometheus.")
     pages: Pages = Field(default=Pages(), description="Pages for pilots as files.")
+    web: Web = Field(default=Web(), description="The pages live.")
     _document: Document = PrivateAttr(Document(Path("configuration"), None, {}))
     _presets: Mapping[str, Preset] = PrivateAttr(default_factory=dict)
     _known: dict[str, Settings] = PrivateAttr(default_factory=dict)

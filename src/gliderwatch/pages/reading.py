@@ -54,10 +54,10 @@ def read_glider(
 
 
 def read_fleet(
-    store: Store, names: list[str], attention: Callable[[str], Attention], now: float
+    store: Store, names: list[str], attention: Callable[[str], Attention], now: float, dives: int = 1
 ) -> tuple[GliderView, ...]:
     """What the page of the fleet shows of each glider."""
-    return tuple(read_glider(store, name, attention(name), now, dives=1, whole=False) for name in names)
+    return tuple(read_glider(store, name, attention(name), now, dives=dives, whole=False) for name in names)
 
 
 def last_news(store: Store) -> float | None:

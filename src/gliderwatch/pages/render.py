@@ -38,11 +38,13 @@ MOST_MARKED = 15
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """When a page was made (s), when the next is ``due`` (s), and where news of it come from, if any do."""
+    """When a page was made (s), when the next is ``due`` (s), where news of it come from, if any do, and a
+    ``warning`` that stands above all."""
 
     now: float
     due: float
     live: str = ""
+    warning: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,6 +148,11 @@ def sheet_page(view: GliderView, frame: Frame, land: Land) -> str:
         incidents=tuple(recent),
         acks=view.acks,
     )
+
+
+def ack_page(frame: Frame, incident: str, recipient: str, told: str) -> str:
+    """The page of a link that acknowledges: a button, or what was `told`."""
+    return _render("ack.html", frame, incident=incident, recipient=recipient, told=told)
 
 
 def _day(some: Sequence[Assessment]) -> str:

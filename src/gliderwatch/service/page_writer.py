@@ -8,6 +8,7 @@ import signal
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -176,6 +177,7 @@ def _prepare(cache: str) -> None:
     """What the process does first: it yields to all others, and dies at once when it is told to."""
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.nice(_NICENESS)
+    with suppress(OSError):  # systemd's filter may refuse it
+        os.nice(_NICENESS)
     os.environ.setdefault("MPLCONFIGDIR", cache)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
