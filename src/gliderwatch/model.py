@@ -364,6 +364,7 @@ class Kind(StrEnum):
     CORRECTION = "correction"
     OVERDUE = "overdue"
     UNKNOWN = "unknown"
+    REGIME = "regime"
     SURFACING = "surfacing"
     ABORT = "abort"
     CALL = "call"

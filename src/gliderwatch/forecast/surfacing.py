@@ -42,7 +42,7 @@ from gliderwatch.forecast.constants import (
     WILD_CHANGE,
     WORST_COURSE,
 )
-from gliderwatch.forecast.steering import WAYS, Plan, courses
+from gliderwatch.forecast.steering import AGAINST, WAYS, Plan, courses, steered
 from gliderwatch.forecast.timing import quantile
 from gliderwatch.model import Array, Dive, Fix, NextSurfacing, Segment, Unusable
 from gliderwatch.navigation.flight import joined
@@ -66,8 +66,9 @@ class Surfacings:
     ``drift`` (m/s) in them beside the current. ``heading`` the mean vector of the last dive (None: not
     seen yet), ``lengths`` those of the last ones; ``speed`` (m/s) that the glider believes; ``current``
     (m/s) of the last dive, ``change`` ((m/s)2, a component) the mean square of its changes;
-    ``bearing`` (rad) of the waypoint when that dive began. ``waypoints`` in order, the present one last;
-    ``scores`` of the ways of steering, mean square errors of their courses; ``misses``, see `factor`.
+    ``bearing`` (rad) of the waypoint when that dive began, else of the course that it steered.
+    ``waypoints`` in order, the present one last; ``scores`` of the ways of steering, mean square errors of
+    their courses; ``misses``, see `factor`.
     """
 
     fix: Fix | None = None
@@ -180,6 +181,10 @@ def learn(
         waypoints=_waypoints(state.waypoints, waypoint),
         fix=end,
     )
+    if after.bearing is None and state.current is not None and state.speed is not None:
+        flown = _flown(after, dive).heading if dive.track is not None else None
+        course = None if flown is None else steered(np.array(flown), state.speed, np.array(state.current))
+        after = replace(after, bearing=course)
     return _driven(_adrift(_flown(after, dive), state.fix, dive), dive)
 
 
@@ -396,4 +401,7 @@ def _heading(state: Surfacings, speed: float, flow: Array, dive: float) -> tuple
     unknown = np.array([course.unknown for course in made])
     own = float(weights @ (scores + unknown**2)) / 2
     cov = np.asarray((weights[:, None] * off).T @ off + own * np.eye(2))
-    return mean, cov, WAYS[int(np.argmax(weights))] if state.waypoints else WAYS[0]
+    best = int(np.argmax(weights))
+    if not state.waypoints:
+        return mean, cov, AGAINST if state.bearing is not None and best == len(WAYS) - 1 else WAYS[0]
+    return mean, cov, WAYS[best]

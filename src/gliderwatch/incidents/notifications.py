@@ -9,11 +9,12 @@ from math import ceil
 from types import MappingProxyType
 from typing import Protocol
 
+from gliderwatch.fleet.advice import Advice
 from gliderwatch.incidents.aborts import Episode
 from gliderwatch.incidents.acknowledgement import Acks
 from gliderwatch.incidents.calls import Empty
-from gliderwatch.incidents.constants import FLOW_CHANGE, MARKS, NEWS, SLACK, SPEED_CHANGE, WEEK
-from gliderwatch.incidents.notices import Cleared, Corrected, Notice, Opened, StillOpen, Surfaced
+from gliderwatch.incidents.constants import FLOW_CHANGE, MARKS, NEWS, REGIME_DIVES, SLACK, SPEED_CHANGE, WEEK
+from gliderwatch.incidents.notices import Cleared, Corrected, NewRegime, Notice, Opened, StillOpen, Surfaced
 from gliderwatch.incidents.overdue import Silence
 from gliderwatch.incidents.unjudged import Unknown
 from gliderwatch.model import Assessment, Incident, Kind, NextSurfacing, Severity
@@ -48,7 +49,7 @@ class NotificationState:
         ``surfaced`` is the surfacing of the last notice (s), ``silences`` what was sent of its staying away
     (`incidents.overdue`), ``unknown`` of dives that could not be judged (`incidents.unjudged`), ``aborts`` of
     aborts (`incidents.aborts`), ``empty`` of calls without a file (`incidents.calls`), ``irregularities`` the
-    ids of those of its files.
+    ids of those of its files, ``renewed`` the dive (s) of the last notice of a new way of flying.
     """
 
     threads: tuple[Thread, ...] = ()
@@ -58,6 +59,7 @@ class NotificationState:
     aborts: tuple[Episode, ...] = ()
     empty: Empty | None = None
     irregularities: tuple[str, ...] = ()
+    renewed: float | None = None
 
 
 class IncidentFacts(Protocol):
@@ -82,11 +84,13 @@ def due_notifications(
     reminder_hours: float | None,
     notices: bool,
     acks: Acks = NO_ACKS,
+    advice: tuple[tuple[str, Advice], ...] = (),
 ) -> tuple[NotificationState, list[Notice]]:
     """The messages to send now, and what will have been said then.
 
     `notices`: whether anyone wants a notice of each surfacing. An incident that somebody has acknowledged
-    (`acks`) is not brought to mind, unless it has grown worse since.
+    (`acks`) is not brought to mind, unless it has grown worse since. `advice`: where to look next, by the
+    name of the field.
     """
     latest = known.last_surfacing(float("inf"))
     if latest is None:
@@ -107,6 +111,8 @@ def due_notifications(
             thread, more = _begun(incident, known, latest, {t.id for t in threads})
             threads.append(thread)
             alerts += more
+    renewed, more = _new_regime(said.renewed, known, latest)
+    alerts += more
     surfaced = said.surfaced
     if notices and _is_another(latest, surfaced):
         identity = f"{latest.glider}/surfacing/{latest.t_dive:.0f}"
@@ -115,14 +121,41 @@ def due_notifications(
         expected = known.expected(float("inf"))
         if expected is not None and expected.after < latest.t_surface:
             expected = None  # of an earlier surfacing: the last dive cannot be used
-        content = Surfaced(latest, previous, expected)
+        content = Surfaced(latest, previous, expected, advice)
         info = Severity.INFO
         alerts.append(
             Notice(identity, "", latest.glider, latest.t_surface, Kind.SURFACING, info, info, content)
         )
         surfaced = latest.t_surface
-    said = replace(said, threads=tuple(threads), surfaced=surfaced)
+    said = replace(said, threads=tuple(threads), surfaced=surfaced, renewed=renewed)
     return said, sorted(alerts, key=lambda a: a.time)
+
+
+def _new_regime(
+    renewed: float | None, known: IncidentFacts, latest: Assessment
+) -> tuple[float | None, list[Notice]]:
+    """The dive (s) whose new way of flying people were told of, and the notice of one that is news.
+
+    Files may have come together: it is looked for among the last `REGIME_DIVES`.
+    """
+    dives = [latest]
+    for _ in range(REGIME_DIVES):
+        earlier = known.last_surfacing(dives[-1].t_surface - 1.0)
+        if earlier is None:
+            break
+        dives.append(earlier)
+    for k, dive in enumerate(dives):
+        before = dive.evidence.get("usual_before")
+        if renewed is not None and dive.t_dive <= renewed:
+            break
+        if before is not None and dive.speed is not None and latest.t_surface - dive.t_surface < NEWS:
+            since = dives[min(k + 2, len(dives) - 1)].t_dive
+            identity = f"{dive.glider}/regime/{dive.t_dive:.0f}"
+            content, at = NewRegime(dive, before, since), dive.t_surface
+            severity, audience = Severity.INFO, Severity.WARNING
+            notice = Notice(identity, "", dive.glider, at, Kind.REGIME, severity, audience, content)
+            return dive.t_dive, [notice]
+    return renewed, []
 
 
 def unacknowledged(said: NotificationState, incidents: tuple[Incident, ...], acks: Acks) -> frozenset[str]:
@@ -168,7 +201,7 @@ def as_notified(said: NotificationState, known: IncidentFacts) -> NotificationSt
     for i in incidents:
         if i.id not in old and i.cleared_at is not None and _is_news(i, latest):
             threads.append(Thread(i.id, i, i.last, 0, latest.t_surface))
-    return replace(said, threads=tuple(threads))
+    return replace(said, threads=tuple(threads), renewed=latest.t_dive)
 
 
 def _is_acknowledged(thread: Thread, now: Incident, acks: Acks) -> bool:

@@ -7,7 +7,10 @@ each is made one printable line (`formatting.clean`).
 
 from __future__ import annotations
 
-from gliderwatch.incidents.notices import Cleared, Corrected, Opened, StillOpen, Surfaced
+from math import degrees
+
+from gliderwatch.fleet.advice import Advice
+from gliderwatch.incidents.notices import Cleared, Corrected, NewRegime, Opened, StillOpen, Surfaced
 from gliderwatch.messages.evidence import checks, difference, how_sure, out_of_range, weigh
 from gliderwatch.messages.formatting import (
     INCIDENTS,
@@ -108,12 +111,40 @@ def surfaced(glider: str, content: Surfaced) -> Text:
     if expected is not None:
         when = f"{utc(expected.t)}, within {duration(1.96 * expected.t_sigma)} (95 %)"
         after += (("Next surfacing", f"{when}, {place(expected.lat, expected.lon)}"),)
+    after += tuple((f"Look next for {clean(name, 64)}", _advice(each)) for name, each in content.advice)
     page = Page(
         (f"{clean(glider, 40)} surfaced {utc(a.t_surface)}: {flag_words(a)}.",),
         (*after, *_facts(a, 0)),
         (("Data", tuple(clean(note) for note in a.notes)),) if a.notes else (),
     )
     return f"SURFACED {clean(glider, 40)} {utc(a.t_surface)}: {_speed(a)}, {flag_words(a, short=True)}", page
+
+
+def new_regime(glider: str, content: NewRegime) -> Text:
+    """The glider is flown in a new way."""
+    a, before, name = content.dive, content.before, clean(glider, 40)
+    assert a.speed is not None
+    what = "faster" if a.speed > before else "slower"
+    normal = f"{a.speed_min:.2f} to {a.speed_max:.2f} m/s"
+    why = "A thruster, ballast or pitch does that" if what == "faster" else "Pitch or ballast changed as well"
+    since = utc(content.since)
+    lead = f"{name} flies {what} since {since}: {a.speed:.2f} m/s, {before:.2f} m/s before."
+    check = (
+        f"{why}; if it was not you, see what is wrong.",
+        "To say otherwise, set normal_speed for this glider in the configuration.",
+    )
+    page = Page(
+        (lead, f"New normal range: {normal}, unless you say otherwise."),
+        (("Since", since), *_facts(a, 0)),
+        (("Check", check),),
+    )
+    return f"NEW NORMAL {name}: flies {what}, {a.speed:.2f} m/s (now normal: {normal})", page
+
+
+def _advice(advice: Advice) -> str:
+    """Heading and waypoint of an advice, and what it is good for."""
+    steer = f"steer {degrees(advice.heading):03.0f} deg true to {place(advice.lat, advice.lon)}"
+    return f"{steer}: takes {100 * advice.variance:.1f} % off the uncertainty"
 
 
 def flag_words(assessment: Assessment, *, short: bool = False) -> str:

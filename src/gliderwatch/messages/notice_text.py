@@ -21,6 +21,7 @@ _WRITERS: dict[type, Callable[[str, Any], Text]] = {
     n.Cleared: incident_text.cleared,
     n.Corrected: incident_text.corrected,
     n.Surfaced: incident_text.surfaced,
+    n.NewRegime: incident_text.new_regime,
     n.Overdue: overdue_text.overdue,
     n.CalledAgain: overdue_text.called_again,
     n.CalledInTime: overdue_text.called_in_time,

@@ -20,6 +20,7 @@ from gliderwatch.incidents.notices import (
     Corrected,
     DriftEllipse,
     Fleet,
+    NewRegime,
     Notice,
     Opened,
     Overdue,
@@ -206,6 +207,11 @@ def _surfacing(now: float) -> Alert:
     return _message(Kind.SURFACING, Severity.INFO, now, Surfaced(dive, now - 4 * _HOUR, expected))
 
 
+def _regime(now: float) -> Alert:
+    dive = replace(_at(_HEALTHY, now), speed=0.49, speed_min=0.42, speed_max=0.66)
+    return _message(Kind.REGIME, Severity.INFO, now, NewRegime(dive, 0.29, now - 10 * _HOUR))
+
+
 def _operator(now: float) -> Alert:
     return operator(
         "no file of any glider for 26.0 h",
@@ -227,6 +233,7 @@ SAMPLES: dict[Kind, Callable[[float], Alert]] = {
     Kind.ALL_CLEAR: _all_clear,
     Kind.REMINDER: _reminder,
     Kind.CORRECTION: _correction,
+    Kind.REGIME: _regime,
     Kind.SURFACING: _surfacing,
     Kind.OPERATOR: _operator,
 }
