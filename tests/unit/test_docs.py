@@ -279,7 +279,11 @@ def test_layers_are_those_of_the_contract() -> None:
 
 
 def test_every_package_has_its_reason() -> None:
-    wanted = tomllib.loads(text("pyproject.toml"))["project"]["dependencies"]
+    project = tomllib.loads(text("pyproject.toml"))["project"]
+    wanted = [
+        *project["dependencies"],
+        *(p for extra in project["optional-dependencies"].values() for p in extra),
+    ]
     names = [re.split(r"[<>=\[]", package)[0] for package in wanted]
     rows = re.findall(r"^\| (\w[\w.-]*) \|", text("docs/libraries.md"), re.M)
     assert sorted(names) == sorted(rows[1:-1] if rows[-1] == "what" else rows[1:])
