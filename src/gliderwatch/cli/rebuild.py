@@ -213,6 +213,7 @@ def _fill(work: _Work, paths: Sequence[str], held: Sequence[SegmentId], on_step:
     steps.sort(key=_turn)
     ocean = OceanCache(work.config)
     with Decoder(caches, max_workers=2) as decoder:
+        decoder.science = bool(work.config.fields)
         results = decoder.map([Path(job.file.path) for _, job in steps if job is not None])
         for done, (identity, job) in enumerate(steps, 1):
             segment = _fuller(work, identity) if job is None else next(results)[1]

@@ -17,15 +17,18 @@ from gliderwatch.config.fields import GliderName, Name, Section
 from gliderwatch.config.schema import (
     Channel,
     Dockserver,
+    FieldSetting,
     Glider,
     Heartbeat,
     Metrics,
     Ocean,
     Operator,
+    Pages,
     Preset,
     Recipient,
     Settings,
     State,
+    Web,
 )
 from gliderwatch.errors import ConfigError
 from gliderwatch.params import Attention, GliderParams
@@ -42,6 +45,9 @@ class Config(Section):
 
     dockserver: Dockserver = Field(description="Where files arrive.")
     ocean: Ocean = Field(default=Ocean(), description="An ocean model, for `reference: model`.")
+    fields: dict[Name, FieldSetting] = Field(
+        default_factory=dict, description="Fields that the gliders measure together."
+    )
     state: State = Field(default=State(), description="What gliderwatch remembers.")
     defaults: Settings = Field(default=Settings(), description="Settings of all gliders.")
     gliders: dict[GliderName, Glider] = Field(
@@ -50,9 +56,11 @@ class Config(Section):
     )
     channels: dict[Name, Channel] = Field(default_factory=dict, description="Ways to send messages.")
     recipients: dict[Name, Recipient] = Field(default_factory=dict, description="Who gets what.")
-    operator: Operator = Field(default=Operator(), description="When the operator is told.")
+    operator: Operator = Field(default=Operator(), description="When the operator gets a message.")
     heartbeat: Heartbeat = Field(default=Heartbeat(), description="For a dead man's switch.")
     metrics: Metrics = Field(default=Metrics(), description="For Prometheus.")
+    pages: Pages = Field(default=Pages(), description="Pages for pilots as files.")
+    web: Web = Field(default=Web(), description="The pages live.")
     _document: Document = PrivateAttr(Document(Path("configuration"), None, {}))
     _presets: Mapping[str, Preset] = PrivateAttr(default_factory=dict)
     _known: dict[str, Settings] = PrivateAttr(default_factory=dict)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from gliderwatch.fleet.advice import Advice
 from gliderwatch.model import (
     Assessment,
     Call,
@@ -64,11 +65,13 @@ class Corrected:
 
 @dataclass(frozen=True, slots=True)
 class Surfaced:
-    """A surfacing; ``previous`` is the time of the one before (s), ``expected`` the next."""
+    """A surfacing; ``previous`` is the time of the one before (s), ``expected`` the next; ``advice`` where to
+    look next for a field, by its name."""
 
     dive: Assessment
     previous: float | None
     expected: NextSurfacing | None
+    advice: tuple[tuple[str, Advice], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ from math import ceil
 from types import MappingProxyType
 from typing import Protocol
 
+from gliderwatch.fleet.advice import Advice
 from gliderwatch.incidents.aborts import Episode
 from gliderwatch.incidents.acknowledgement import Acks
 from gliderwatch.incidents.calls import Empty
@@ -83,11 +84,13 @@ def due_notifications(
     reminder_hours: float | None,
     notices: bool,
     acks: Acks = NO_ACKS,
+    advice: tuple[tuple[str, Advice], ...] = (),
 ) -> tuple[NotificationState, list[Notice]]:
     """The messages to send now, and what will have been said then.
 
     `notices`: whether anyone wants a notice of each surfacing. An incident that somebody has acknowledged
-    (`acks`) is not brought to mind, unless it has grown worse since.
+    (`acks`) is not brought to mind, unless it has grown worse since. `advice`: where to look next, by the
+    name of the field.
     """
     latest = known.last_surfacing(float("inf"))
     if latest is None:
@@ -118,7 +121,7 @@ def due_notifications(
         expected = known.expected(float("inf"))
         if expected is not None and expected.after < latest.t_surface:
             expected = None  # of an earlier surfacing: the last dive cannot be used
-        content = Surfaced(latest, previous, expected)
+        content = Surfaced(latest, previous, expected, advice)
         info = Severity.INFO
         alerts.append(
             Notice(identity, "", latest.glider, latest.t_surface, Kind.SURFACING, info, info, content)

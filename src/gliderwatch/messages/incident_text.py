@@ -7,6 +7,9 @@ each is made one printable line (`formatting.clean`).
 
 from __future__ import annotations
 
+from math import degrees
+
+from gliderwatch.fleet.advice import Advice
 from gliderwatch.incidents.notices import Cleared, Corrected, NewRegime, Opened, StillOpen, Surfaced
 from gliderwatch.messages.evidence import checks, difference, how_sure, out_of_range, weigh
 from gliderwatch.messages.formatting import (
@@ -108,6 +111,7 @@ def surfaced(glider: str, content: Surfaced) -> Text:
     if expected is not None:
         when = f"{utc(expected.t)}, within {duration(1.96 * expected.t_sigma)} (95 %)"
         after += (("Next surfacing", f"{when}, {place(expected.lat, expected.lon)}"),)
+    after += tuple((f"Look next for {clean(name, 64)}", _advice(each)) for name, each in content.advice)
     page = Page(
         (f"{clean(glider, 40)} surfaced {utc(a.t_surface)}: {flag_words(a)}.",),
         (*after, *_facts(a, 0)),
@@ -135,6 +139,12 @@ def new_regime(glider: str, content: NewRegime) -> Text:
         (("Check", check),),
     )
     return f"NEW NORMAL {name}: flies {what}, {a.speed:.2f} m/s (now normal: {normal})", page
+
+
+def _advice(advice: Advice) -> str:
+    """Heading and waypoint of an advice, and what it is good for."""
+    steer = f"steer {degrees(advice.heading):03.0f} deg true to {place(advice.lat, advice.lon)}"
+    return f"{steer}: takes {100 * advice.variance:.1f} % off the uncertainty"
 
 
 def flag_words(assessment: Assessment, *, short: bool = False) -> str:

@@ -15,10 +15,11 @@ from pathlib import Path
 
 import structlog
 
-from gliderwatch.errors import Quarantine, StateError
+from gliderwatch.errors import GliderwatchError, Quarantine, StateError
 from gliderwatch.model import Alert, Segment
 from gliderwatch.service import judgement, logs, transaction
 from gliderwatch.service.backlog import Job
+from gliderwatch.service.fields import write_goto
 from gliderwatch.service.heartbeat import Upkeep
 from gliderwatch.service.routing import Routing
 from gliderwatch.service.runtime import Decoded, Runtime
@@ -43,13 +44,20 @@ LONGEST = 120.0
 class Intake:
     """Takes files from the watcher to the state file.
 
-    `wake` is set when there are messages to deliver; while `is_stopping` nothing is begun any more.
+    `wake` is set when there are messages to deliver, `changed` called with each glider that has news;
+    while `is_stopping` nothing is begun any more.
     """
 
     def __init__(
-        self, store: Store, upkeep: Upkeep, wake: threading.Event, is_stopping: Callable[[], bool]
+        self,
+        store: Store,
+        upkeep: Upkeep,
+        wake: threading.Event,
+        is_stopping: Callable[[], bool],
+        changed: Callable[[str], None],
     ) -> None:
         self._store, self._upkeep, self._wake, self._is_stopping = store, upkeep, wake, is_stopping
+        self._changed = changed
         self._unmuted_until = time.time()
         self._returned: dict[str, tuple[float, float]] = {}
 
@@ -138,14 +146,17 @@ class Intake:
     # ----------------------------------------------------------------- judged
 
     def _judge_any(self, path: Path) -> None:
-        """Of a science file it is the flight file beside it that is judged again, if it lacks the depth."""
+        """Of a science file it is the flight file beside it that is judged again, if it lacks the depth, or
+        if there are fields to be made."""
         if folders.is_log(path.name):
             self._read_log(path)
         elif not folders.is_science(path.name):
             self._judge(path)
         else:
             for flight in flight_files(path):
-                if judgement.lacks_depth(flight, self._store, self._runtime.decoder.cache_folders):
+                caches = self._runtime.decoder.cache_folders
+                wanted = bool(self._runtime.fields) and judgement.is_as_judged(flight, self._store)
+                if wanted or judgement.lacks_depth(flight, self._store, caches):
                     self._judge(flight, again=True)
 
     def _judge(self, path: Path, *, again: bool = False) -> None:
@@ -222,7 +233,15 @@ class Intake:
             now, ocean = time.time(), self._runtime.ocean.field(glider)
             with self._store.followed_by(self._runtime.backlog.behind(glider)):
                 taken = transaction.process_file(
-                    self._store, file, segment, params, routing, now, self._is_stopping, ocean
+                    self._store,
+                    file,
+                    segment,
+                    params,
+                    routing,
+                    now,
+                    self._is_stopping,
+                    ocean,
+                    self._runtime.fields,
                 )
         except Quarantine as error:
             log.error("file cannot be assessed", path=file.path, glider=glider, exc_info=error.__cause__)
@@ -261,12 +280,21 @@ class Intake:
         if before is None or before.status != file.status:  # not once for each line that comes
             self._report(taken)
         else:
+            self._changed(file.glider)
             self.send(taken.alerts)
 
     def _report(self, outcome: transaction.FileOutcome, seconds: float | None = None) -> None:
         logs.taken(outcome)
         self._upkeep.took(outcome, seconds)
+        self._changed(outcome.file.glider)
         self.send(outcome.alerts)
+        for advice in outcome.advice:
+            try:
+                path = write_goto(advice)
+            except GliderwatchError as error:
+                log.error("advice cannot be written", glider=advice.glider, reason=str(error))
+            else:
+                log.info("advice written", glider=advice.glider, path=str(path))
 
     # --------------------------------------------------------------- messages
 
@@ -275,6 +303,8 @@ class Intake:
         logs.alerts(alerts)
         if alerts:
             self._wake.set()
+        for alert in alerts:
+            self._changed(alert.glider)
 
     def notify_all(self) -> None:
         """Say what an earlier life left unsaid of any glider."""

@@ -33,10 +33,15 @@ def state(path: Path) -> tuple[int, int] | None:
     return status.st_size, status.st_mtime_ns
 
 
+def is_as_judged(path: Path, store: Store) -> bool:
+    """Whether a file was looked at before, and is as it was."""
+    before = store.file(_text(path))
+    return before is not None and (before.size, before.mtime_ns) == state(path)
+
+
 def lacks_depth(flight: Path, store: Store, caches: Sequence[Path]) -> bool:
     """Whether a flight file that was looked at before, and is as it was, names no sensor of the depth."""
-    before = store.file(_text(flight))
-    if before is None or (before.size, before.mtime_ns) != state(flight):
+    if not is_as_judged(flight, store):
         return False
     try:
         return needs_science(read_header(flight), caches)

@@ -25,6 +25,7 @@ from gliderwatch.navigation.clock import Stamp, corrections, is_same, numbered
 from gliderwatch.params import GliderParams
 from gliderwatch.service import judgement, transaction
 from gliderwatch.service.backlog import Job
+from gliderwatch.service.fields import FleetField, fields_of
 from gliderwatch.service.jsonl import alert_line, assessment_line, write_lines
 from gliderwatch.service.liveness import alive_path
 from gliderwatch.service.replay_order import Log, ReplayOrder, find_logs, read_logs
@@ -183,6 +184,7 @@ class Report:
 
     store: Store
     ocean: OceanCache | None = None
+    fields: tuple[FleetField, ...] = ()
     files: Counter[Status] = field(default_factory=Counter)
     undelivered: int = 0
     clock: dict[str, float] = field(default_factory=dict)
@@ -207,14 +209,15 @@ def replay(
     with _state(request) as path, tempfile.TemporaryDirectory(prefix="gliderwatch-") as kept:
         lists = SensorLists(Path(kept))
         ocean = None if request.config is None else OceanCache(request.config)
-        report = Report(Store.open(path, durable=False), ocean)
+        fields = () if request.config is None else fields_of(request.config)
+        report = Report(Store.open(path, durable=False), ocean, fields)
         with _delivery(request, path, report) as routing:
             jobs = _judge_all(files, report, lists, request, on_file)
             calls = deque(read_logs(logs, report.store, request.is_wanted))
             _check_glider(request, jobs, calls, report.store)
             report.coming = _coming(jobs, calls)
             order = ReplayOrder(jobs)
-            for decoded in _decoded(jobs, [*cache_folders(request), lists.folder], workers):
+            for decoded in _decoded(jobs, [*cache_folders(request), lists.folder], workers, bool(fields)):
                 for job, sent in order.after(decoded):
                     while calls and calls[0].sent <= sent:
                         _process_log(calls.popleft(), report, request, routing, on_file)
@@ -390,8 +393,9 @@ def _check_glider(request: Request, jobs: Sequence[Job], calls: Iterable[Log], s
         raise GliderwatchError(f"no files of glider {request.glider}, but of: {', '.join(others)}")
 
 
-def _decoded(jobs: Sequence[Job], caches: Sequence[Path], workers: int) -> Iterator[Job]:
+def _decoded(jobs: Sequence[Job], caches: Sequence[Path], workers: int, science: bool) -> Iterator[Job]:
     with Decoder(caches, max_workers=workers) as decoder:
+        decoder.science = science
         results = decoder.map([Path(job.file.path) for job in jobs if job.result is None])
         for job in jobs:
             if job.result is None:
@@ -415,7 +419,7 @@ def _process(
             raise job.result if job.result is not None else Retry("was not decoded")
         ocean = None if report.ocean is None else report.ocean.field(glider)
         outcome = transaction.process_file(
-            report.store, job.file, job.result, params, routing, sent, ocean=ocean
+            report.store, job.file, job.result, params, routing, sent, ocean=ocean, fields=report.fields
         )
     except (Quarantine, Retry) as error:
         outcome = transaction.record_file(

@@ -20,6 +20,8 @@ from gliderwatch.errors import GliderwatchError
 from gliderwatch.model import Segment
 from gliderwatch.sea.ocean_field import Field
 from gliderwatch.service.backlog import Backlog, Job
+from gliderwatch.service.fields import FleetField, fields_of
+from gliderwatch.service.page_writer import PagesWritten
 from gliderwatch.service.routing import Routing, routing_of
 from gliderwatch.slocum.caches import SensorLists, lists_folder
 from gliderwatch.slocum.decode import Decoder
@@ -93,7 +95,7 @@ class Decoded:
         return error if isinstance(error, Exception) else self.future.result()
 
 
-News = Change | Decoded | signal.Signals
+News = Change | Decoded | PagesWritten | signal.Signals
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +113,7 @@ class Runtime:
     backlog: Backlog
     dispatcher: Dispatcher
     ocean: OceanCache
+    fields: tuple[FleetField, ...]
     urls: dict[str, str] = field(repr=False)
 
     def start(self, before: Runtime | None = None) -> None:
@@ -185,7 +188,9 @@ def build(
         Backlog(),
         dispatcher,
         ocean,
+        fields_of(config),
         urls,
     )
+    decoder.science = bool(config.fields)
     decoder.cache_folders = parts.cache_folders()
     return parts

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 
 from gliderwatch.errors import GliderwatchError, NotAssessed
 from gliderwatch.incidents import aborts, irregularities, overdue, unjudged
@@ -18,6 +19,7 @@ from gliderwatch.model import Alert, Assessment, Segment, SegmentId
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
 from gliderwatch.sea.ocean_field import Field
+from gliderwatch.service.fields import FieldAdvice, FleetField, look, take
 from gliderwatch.service.routing import Routing, post_alerts, withdraw_answered
 from gliderwatch.slocum.calls import Dialog
 from gliderwatch.store.codec import plain_encode
@@ -27,11 +29,13 @@ from gliderwatch.store.state_file import File, Status, Store
 
 @dataclass(frozen=True, slots=True)
 class FileOutcome:
-    """What an input led to: what became of its file, the dives assessed anew, the messages made."""
+    """What an input led to: what became of its file, the dives assessed anew, the messages made, and where to
+    look next."""
 
     file: File
     assessments: tuple[Assessment, ...] = ()
     alerts: tuple[Alert, ...] = ()
+    advice: tuple[FieldAdvice, ...] = ()
 
 
 class StoppedError(GliderwatchError):
@@ -47,12 +51,13 @@ def process_file(
     now: float,
     stopping: Callable[[], bool] = lambda: False,
     ocean: Field | None = None,
+    fields: Sequence[FleetField] = (),
 ) -> FileOutcome:
     """Put a segment in its place and go on from the checkpoint before it; say what is to be said.
 
     A copy that holds no more than the one known is only noted. `speaking` is None while more files of the
     glider are at hand: then the last of them speaks for all. `now` (s) is when the file came; `ocean` is a
-    model's field, where dives are compared with one.
+    model's field, where dives are compared with one; `fields` are those that the gliders measure.
     Raises Quarantine for a segment that cannot be assessed, StoppedError once `stopping` holds; then
     nothing has changed.
     """
@@ -66,9 +71,12 @@ def process_file(
             return FileOutcome(file, alerts=_due_messages(store, glider, params, speaking, now))
         file = replace(file, status=Status.TAKEN, reason="")
         store.note(file, now)
-        assessments = _run(store, segment, params, stopping, ocean)
+        assessments, state = _run(store, segment, params, stopping, ocean)
+        if fields:
+            take(store, fields, store.segments.kept(segment.id))
+        advice = look(store, fields, glider, state) if speaking is not None else ()
         alerts = _due_messages(store, glider, params, speaking, now)
-    return FileOutcome(file, assessments, alerts)
+    return FileOutcome(file, assessments, alerts, advice)
 
 
 def record_file(
@@ -191,7 +199,7 @@ def _run(
     params: GliderParams,
     stopping: Callable[[], bool],
     ocean: Field | None,
-) -> tuple[Assessment, ...]:
+) -> tuple[tuple[Assessment, ...], GliderState]:
     segments = store.segments
     state, todo = segments.resume(segments.put(segment))
     dives: dict[float, Assessment] = {}
@@ -207,7 +215,7 @@ def _run(
             a.t_dive: a for a in outcome.assessments
         }
     segments.thin(segment.id.glider)
-    return tuple(dives.values())
+    return tuple(dives.values()), state
 
 
 def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: Field | None) -> Outcome:
@@ -239,6 +247,8 @@ def _due_messages(
         withdraw_answered(store, glider, now, quiet=True)
         return ()
     before, known = store.said(glider), store.known(glider)
+    last = known.last_surfacing(inf)
+    advice = store.fields.advice(glider, last.t_surface) if last is not None else []
     silences, heard = overdue.on_calls(before.silences, known, now)
     said, of_incidents = due_notifications(
         replace(before, silences=silences),
@@ -246,6 +256,7 @@ def _due_messages(
         params.rules.reminder_hours,
         speaking.notices(glider),
         store.notes.acks(glider),
+        tuple((field, each) for field, _, each in advice),
     )
     blind, of_watch = unjudged.announce(said.unknown, known, attention, params.rules.reminder_hours, now)
     ids, of_files = irregularities.due(before.irregularities, known.irregularities(now), now)

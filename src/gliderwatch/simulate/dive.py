@@ -105,10 +105,11 @@ class Reckoning(NamedTuple):
 
 
 class Way(NamedTuple):
-    """Where the glider really is at the nodes of a dive: times (s), metres east of the sea's origin."""
+    """Where the glider really is at the nodes of a dive: times (s), metres from the sea's origin."""
 
     t: Array
     east: Array
+    north: Array
 
 
 def log_dive(glider: Glider, motion: Motion, course: Course, reckoning: Reckoning) -> None:
@@ -236,7 +237,9 @@ def log_science(glider: Glider, motion: Motion, way: Way) -> None:
     at = np.arange(n) / _PER_CYCLE
     t = way.t[0] + CYCLE * at
     depth = np.interp(at, flight, motion.depth)
-    temperature, salinity = scenario.water.properties(t, np.interp(t, way.t, way.east), depth)
+    temperature, salinity = scenario.water.properties(
+        t, np.interp(t, way.t, way.east), np.interp(t, way.t, way.north), depth
+    )
     pressure = 1.006 * depth
     noise = np.array(_SCIENCE_NOISE)[:, None] * glider.luck.standard_normal((3, n))
     cycles = _PER_CYCLE * glider.cycle + np.arange(n)
@@ -272,7 +275,8 @@ def dive(glider: Glider, segment: str) -> Flown:
     east, north = along_heading(motion.speed, kept - glider.health.compass(t), CYCLE)
     at = np.unique(np.append(np.arange(0, n, NODE), n - 1))
     far_east, far_north = glider.carried(t[at], east[at], north[at], motion.depth[at])
-    log_science(glider, motion, Way(t[at], glider.east + east[at] + far_east))
+    way = Way(t[at], glider.east + east[at] + far_east, glider.north + north[at] + far_north)
+    log_science(glider, motion, way)
     end, duration = start + n - 1, CYCLE * (n - 1)
     through = Vector(float(east[-1]) / duration, float(north[-1]) / duration)
     current = Vector(float(far_east[-1]) / duration, float(far_north[-1]) / duration)

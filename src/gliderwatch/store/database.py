@@ -125,7 +125,7 @@ __all__ = [
     "schema",
 ]
 
-SCHEMA = 7
+SCHEMA = 8
 DELIVERY_BY_WORDS = """CASE
     WHEN delivered_at IS NULL THEN 'pending' WHEN error = '' THEN 'delivered'
     WHEN error LIKE 'withdrawn: %' THEN 'withdrawn' WHEN error LIKE 'given up: %' THEN 'unreadable'
@@ -246,6 +246,42 @@ CREATE TABLE calls (              -- what the log of each call has told
     dialog TEXT NOT NULL          -- how far it is read: `ingest.calls.Dialog`
 ) STRICT;
 CREATE INDEX calls_in_order ON calls (glider, last_t);
+""",
+    8: """
+CREATE TABLE field_settings (     -- by which settings each field of `fields:` is made
+    field TEXT PRIMARY KEY,
+    key   TEXT NOT NULL
+) STRICT;
+CREATE TABLE field_batches (      -- samples of a segment for a field: `fleet.batches.packed`
+    field   TEXT NOT NULL,
+    id      TEXT NOT NULL,        -- the same at all relays
+    glider  TEXT NOT NULL,
+    first_t REAL NOT NULL,
+    last_t  REAL NOT NULL,
+    data    BLOB NOT NULL,
+    PRIMARY KEY (field, id)
+) STRICT;
+CREATE INDEX field_batches_in_order ON field_batches (field, last_t);
+CREATE TABLE field_checkpoints (  -- what is known after a bin: `fleet.scalar_field.Information`
+    field TEXT NOT NULL,
+    bin   INTEGER NOT NULL,
+    data  BLOB NOT NULL,
+    PRIMARY KEY (field, bin)
+) STRICT;
+CREATE TABLE field_soundings (    -- the least water depth (m) in cells of 0.01 degrees
+    field TEXT NOT NULL,
+    lat   INTEGER NOT NULL,
+    lon   INTEGER NOT NULL,
+    depth REAL NOT NULL,
+    PRIMARY KEY (field, lat, lon)
+) STRICT;
+CREATE TABLE field_advice (       -- where each glider should look next: `fleet.advice.Advice`
+    field  TEXT NOT NULL,
+    glider TEXT NOT NULL,
+    t      REAL NOT NULL,         -- the surfacing
+    data   TEXT NOT NULL,
+    PRIMARY KEY (field, glider)
+) STRICT;
 """,
 }
 """SQL that leads from the schema before to the one of the key. It may call the functions of

@@ -300,6 +300,13 @@ class Segments:
         row = self._row(identity)
         return moved(codec.decode(row["segment"], Segment), row["clock_offset"])
 
+    def kept(self, identity: SegmentId) -> Segment:
+        """The copy that is held of a segment by the glider's clock, in its right time."""
+        row = self._held(identity)
+        if row is None:
+            raise KeyError(identity.name)
+        return self.get(SegmentId(row["opened_at"], identity.glider, identity.name))
+
     def as_sent(self, identity: SegmentId) -> Segment:
         """The same in the time of the glider's clock."""
         return codec.decode(self._row(identity)["segment"], Segment)

@@ -22,6 +22,7 @@ from gliderwatch.pipeline import Outcome
 from gliderwatch.store import codec, outbox, retention, segments
 from gliderwatch.store.codec import File, Status, Undelivered, file_of, values
 from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, read_only
+from gliderwatch.store.fields import Fields
 from gliderwatch.store.results import Annotations, Calls, GliderFacts
 from gliderwatch.store.segments import RECENT, Segments
 
@@ -45,7 +46,7 @@ class Store:
     def __init__(self, connection: sqlite3.Connection, path: Path | str = MEMORY) -> None:
         self._db, self._path = connection, path
         self.segments, self.notes = Segments(connection), Annotations(connection)
-        self.calls = Calls(connection)
+        self.calls, self.fields = Calls(connection), Fields(connection)
 
     @classmethod
     def open(cls, path: Path | str, *, durable: bool = True) -> Store:
@@ -87,6 +88,7 @@ class Store:
             except BaseException:
                 self.segments.ahead.rollback()
                 self.segments.clocks.clear()
+                self.fields.rollback()
                 if self._db.in_transaction:  # on a full disk SQLite may have ended it by itself
                     self._db.execute("ROLLBACK")
                 raise
