@@ -16,6 +16,7 @@ from html import unescape
 from pathlib import Path
 from types import ModuleType
 
+import click
 import pytest
 from ruamel.yaml import YAML
 
@@ -102,6 +103,8 @@ def test_commands_and_their_options_exist(page: Path) -> None:
         if not words:
             continue
         command = main.commands[words[1]]
+        if isinstance(command, click.Group):
+            command = command.commands[words[2]]
         known = {option for parameter in command.params for option in parameter.opts}
         assert {word for word in words[2:] if word.startswith("-")} <= known, f"{page.name}: {line}"
 

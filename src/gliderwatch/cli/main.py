@@ -10,6 +10,7 @@ import click
 from gliderwatch import __version__
 from gliderwatch.cli.export import COMMANDS as EXPORTING
 from gliderwatch.cli.field import field
+from gliderwatch.cli.layers import layers
 from gliderwatch.cli.look import LOOKING
 from gliderwatch.cli.manage import COMMANDS
 from gliderwatch.cli.options import Group
@@ -29,5 +30,5 @@ def main() -> None:
             stream.reconfigure(errors="replace")
 
 
-for command in (run, *LOOKING, *COMMANDS, *EXPORTING, pages, web, field, simulate, score):
+for command in (run, *LOOKING, *COMMANDS, *EXPORTING, pages, web, field, layers, simulate, score):
     main.add_command(command)
