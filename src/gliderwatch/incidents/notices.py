@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gliderwatch.fleet.advice import Advice
+from gliderwatch.fleet.cross_check import Fault, Hypothesis
 from gliderwatch.model import (
     Assessment,
     Call,
@@ -304,6 +305,28 @@ class Irregularity:
     what: ClockStep | OldDates | TwoGliders
 
 
+# ----------------------------------------------------------------- neighbours
+
+
+@dataclass(frozen=True, slots=True)
+class DiffersFromNeighbours:
+    """The currents of a glider do not fit those of its ``neighbours``, of which the next is ``nearest`` (m)
+    away: ``found`` explains it. Where that is of no glider all have it alike."""
+
+    found: Hypothesis
+    neighbours: tuple[str, ...]
+    nearest: float
+
+
+@dataclass(frozen=True, slots=True)
+class FitsNeighbours:
+    """They fit again, at a surfacing ``t`` (s): there is no sign of the ``fault`` any more."""
+
+    fault: Fault
+    neighbours: tuple[str, ...]
+    t: float
+
+
 Content = (
     Opened
     | StillOpen
@@ -321,6 +344,8 @@ Content = (
     | CalledWithoutFile
     | SendsAgain
     | Irregularity
+    | DiffersFromNeighbours
+    | FitsNeighbours
 )
 
 
