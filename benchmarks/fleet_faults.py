@@ -34,6 +34,8 @@ from gliderwatch.simulate.seas import SEAS, sea_mission
 DAY, HOUR = 86400.0, 3600.0
 ACROSS = 25e3
 """m: gliders begin within so much of the middle, to the east and to the north."""
+APART = 0.15
+"""rad: by so much their headings differ, so that they stay together for a week."""
 TIME = 48.0
 """Hours in which a fault is to be told."""
 SAID = {"anomaly", "false_alarm", "neighbours"}
@@ -70,10 +72,10 @@ def fleet(job: Job) -> list[Scenario]:
     sent = {name: every for name, every in base.cadence.items() if name != "m_roll"}
     base = replace(base, interval=3 * HOUR, cadence=sent)
     rng = np.random.default_rng([job.seed, 17])
-    out = []
+    out, heading = [], rng.uniform(0, 2 * np.pi)
     for k in range(job.gliders):
         east, north = rng.uniform(-ACROSS, ACROSS, 2)
-        angle = rng.uniform(0, 2 * np.pi)
+        angle = heading + rng.uniform(-APART, APART)
         place = _offset(base.place, east, north)
         far = _offset(place, 400e3 * np.sin(angle), 400e3 * np.cos(angle))
         faults = ()
@@ -141,7 +143,7 @@ def main() -> None:
     parser.add_argument("--gliders", type=int, nargs="+", default=[1, 2, 4, 8])
     parser.add_argument("--faults", nargs="+", default=["wing_loss:0.4", "compass:0.3", "none"])
     parser.add_argument("--seeds", type=int, default=1)
-    parser.add_argument("--days", type=float, default=8.0)
+    parser.add_argument("--days", type=float, default=6.5)
     parser.add_argument("--onset", type=float, default=4.0)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--json", type=Path)

@@ -88,7 +88,7 @@ def test_nobody_near_nothing_to_compare() -> None:
 def test_what_is_small_or_short_is_not_sure() -> None:
     found = cross_check(wrong(fleet(6, 4), Fault.LOSS, 0.4, "g2"), "g2")
     assert found.found is not None
-    for weaker in ({"size": 0.1}, {"ratio": 19.0}, {"dives": 3}):
+    for weaker in ({"size": 0.1}, {"ratio": 15.0}, {"dives": 3}):
         assert Check(found.neighbours, 1e3, replace(found.found, **weaker), None).sure is None
     assert Check(found.neighbours, 1e3, found.found, replace(found.found, glider="g1")).sure is None
 

@@ -13,7 +13,7 @@ SURE, CLEAR = Check(("b", "c"), 9e3, LOSS, None), Check(("b", "c"), 9e3, None, N
 ALL = Check(("b", "c"), 9e3, None, None, replace(LOSS, glider="", fault=Fault.TURN))
 
 
-def told(*checks: Check | None):
+def reported(*checks: Check | None):
     state, out = None, []
     for k, check in enumerate(checks):
         state, notices = announce("a", state, check, T + k * 3 * HOUR)
@@ -22,9 +22,9 @@ def told(*checks: Check | None):
 
 
 def test_two_surfacings_in_a_row_and_once():
-    assert told(SURE)[1] == []
-    assert told(SURE, CLEAR, SURE)[1] == []
-    state, alerts = told(SURE, SURE, SURE, SURE)
+    assert reported(SURE)[1] == []
+    assert reported(SURE, CLEAR, SURE)[1] == []
+    state, alerts = reported(SURE, SURE, SURE, SURE)
     assert [(a.kind, a.severity) for a in alerts] == [(Kind.NEIGHBOURS, Severity.CRITICAL)]
     assert (
         alerts[0].title == "DIFFERS FROM NEIGHBOURS a: makes 40 % less way through the water than it believes"
@@ -33,17 +33,15 @@ def test_two_surfacings_in_a_row_and_once():
     assert state.id == alerts[0].incident == f"a/neighbours/loss/{LOSS.since:.0f}"
 
 
-def test_it_is_over_after_two_without_and_not_because_the_neighbours_left():
-    assert len(told(SURE, SURE, None, None, None)[1]) == 1
-    state, alerts = told(SURE, SURE, CLEAR, None, CLEAR)
-    assert [a.kind for a in alerts] == [Kind.NEIGHBOURS, Kind.ALL_CLEAR]
-    assert alerts[1].audience == Severity.CRITICAL
-    assert alerts[1].incident == alerts[0].incident
-    assert (state.id, state.reported) == ("", None)
+def test_it_is_not_reported_again_for_a_week_nor_called_over():
+    assert len(reported(SURE, SURE, None, CLEAR, CLEAR, CLEAR, SURE, SURE)[1]) == 1
+    _, alerts = reported(*[SURE] * 60)
+    assert [a.kind for a in alerts] == [Kind.NEIGHBOURS] * 2
+    assert alerts[1].time - alerts[0].time > 7 * 86400
 
 
 def test_what_all_share_is_one_message_for_all():
-    first = told(ALL, ALL)[1][0]
+    first = reported(ALL, ALL)[1][0]
     _, notices = announce("b", Comparison(T, Fault.TURN, 1), ALL, T + 3 * HOUR)
     other = render(notices[0])
     assert first.id == other.id

@@ -100,9 +100,12 @@ days."""
 LEAST_LOSS, LEAST_TURN = 0.15, 0.12
 """Part of the speed, and rad: smaller faults are not told by the fleet. A healthy glider's current is 5 to 10
 % of its speed off."""
-SURE, CLEARER = 20.0, 6.0
+USUAL_SLIP, USUAL_TURN = 0.08, 0.05
+"""Part of the speed, and rad: by how much the current of a healthy glider is off, all the time: the angle of
+attack that is not allowed for on board, and how the compass is mounted."""
+SURE, CLEARER, SHARED_SURE = 16.0, 6.0, 40.0
 """Twice the log likelihood ratio of a fault to none, and to the likeliest fault of another glider, at which
-it is told."""
+it is told; and the first for an error that all share: where all fly one way a current looks alike."""
 BETWEEN_DIVES = 6 * 3600.0
 """s at the surface after which a dive is not taken to begin where the one before ended."""
 DOUBTED_SPEED = 0.15

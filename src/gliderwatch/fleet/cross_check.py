@@ -38,7 +38,10 @@ from gliderwatch.fleet.constants import (
     SEA_MEAN,
     SEA_TIDE,
     SEA_TIDE_GRADIENT,
+    SHARED_SURE,
     SURE,
+    USUAL_SLIP,
+    USUAL_TURN,
 )
 from gliderwatch.fleet.flow import DiveCurrent, FlowSizes, currents_covariance
 from gliderwatch.model import Array, Assessment, Fix, Flag
@@ -100,7 +103,7 @@ class Check:
 
 
 def _is_large(found: Hypothesis | None) -> bool:
-    if found is None or found.ratio < SURE or found.dives < LEAST_DIVES:
+    if found is None or found.ratio < (SURE if found.glider else SHARED_SURE) or found.dives < LEAST_DIVES:
         return False
     return abs(found.size) >= (LEAST_LOSS if found.fault is Fault.LOSS else LEAST_TURN)
 
@@ -168,8 +171,9 @@ def _hypotheses(currents: Sequence[DiveCurrent]) -> Iterator[Hypothesis]:
         return
     shapes = np.array([shape for *_, shape in tried]).T
     plain, likelihoods, sizes, sigmas = -math.inf, [], [], []
+    healthy = _healthy_errors(currents)
     for sea in _SEAS:
-        factor = cho_factor(currents_covariance(currents, sea), lower=True)
+        factor = cho_factor(currents_covariance(currents, sea) + healthy, lower=True)
         weighed = cho_solve(factor, np.column_stack([measured, shapes]))
         none = -0.5 * float(measured @ weighed[:, 0]) - float(np.log(np.diag(factor[0])).sum())
         info = np.maximum(np.einsum("ij,ij->j", shapes, weighed[:, 1:]), 1e-9)
@@ -200,6 +204,16 @@ def _candidates(currents: Sequence[DiveCurrent]) -> Iterator[tuple[str, Fault, f
     for fault in Fault:
         parts = [_effect(each, fault) for each in currents]
         yield "", fault, currents[0].start.t, len(currents), np.concatenate(parts)
+
+
+def _healthy_errors(currents: Sequence[DiveCurrent]) -> Array:
+    """Covariance of what is off in the currents of each healthy glider all the time."""
+    out = np.zeros((2 * len(currents), 2 * len(currents)))
+    for fault, usual in ((Fault.LOSS, USUAL_SLIP), (Fault.TURN, USUAL_TURN)):
+        effects = np.concatenate([_effect(each, fault) for each in currents])
+        names = np.repeat([each.glider for each in currents], 2)
+        out += usual**2 * np.outer(effects, effects) * (names[:, None] == names)
+    return out
 
 
 def _effect(current: DiveCurrent, fault: Fault) -> Array:

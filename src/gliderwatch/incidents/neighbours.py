@@ -6,8 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from gliderwatch.fleet.cross_check import Check, Fault, Hypothesis
-from gliderwatch.incidents.constants import NEIGHBOURS_IN_A_ROW
-from gliderwatch.incidents.notices import DiffersFromNeighbours, FitsNeighbours, Notice
+from gliderwatch.incidents.constants import NEIGHBOURS_AGAIN, NEIGHBOURS_IN_A_ROW
+from gliderwatch.incidents.notices import DiffersFromNeighbours, Notice
 from gliderwatch.model import Kind, Severity
 
 
@@ -16,15 +16,14 @@ class Comparison:
     """How a glider stood to its neighbours at the surfacing ``checked`` (s).
 
     ``fault`` is that of the last comparison (None: none is sure), ``in_a_row`` how many said the same; ``id``
-    of what is reported and not over (empty: nothing), of the fault ``reported``, to whom it ``went``.
+    of what was reported (empty: nothing) at the surfacing ``since`` (s).
     """
 
     checked: float
     fault: Fault | None = None
     in_a_row: int = 0
     id: str = ""
-    reported: Fault | None = None
-    went: Severity = Severity.WARNING
+    since: float = 0.0
 
 
 def announce(
@@ -33,26 +32,20 @@ def announce(
     """How a glider stands after one more surfacing (s), and what is to be reported.
 
     ``check`` is the comparison at it, None where nobody is near. A fault is reported when some comparisons in
-    a row show it; it is over when as many show none. Nothing is over because the neighbours went away.
+    a row show it, and then not again for some days. That it is over is never reported: after as many days a
+    fault that lasts is what is usual, and shows no more than none.
     """
-    state = before or Comparison(surfaced)
+    state = replace(before or Comparison(surfaced), checked=surfaced)
+    if state.id and surfaced - state.since > NEIGHBOURS_AGAIN:
+        state = replace(state, id="")
     if check is None:
-        return replace(state, checked=surfaced), []
+        return state, []
     found = check.sure
     fault = None if found is None else found.fault
-    row = state.in_a_row + 1 if fault == state.fault else 1
-    state = replace(state, checked=surfaced, fault=fault, in_a_row=row)
-    if row < NEIGHBOURS_IN_A_ROW:
+    state = replace(state, fault=fault, in_a_row=state.in_a_row + 1 if fault == state.fault else 1)
+    if found is None or state.id or state.in_a_row < NEIGHBOURS_IN_A_ROW:
         return state, []
-    if found is not None and not state.id:
-        return _begun(glider, state, check, found)
-    if found is None and state.id and state.reported is not None:
-        notice = Notice(
-            f"{state.id}/over", state.id, glider, surfaced, Kind.ALL_CLEAR, Severity.INFO, state.went,
-            FitsNeighbours(state.reported, check.neighbours, surfaced),
-        )  # fmt: skip
-        return replace(state, id="", reported=None), [notice]
-    return state, []
+    return _begun(glider, state, check, found)
 
 
 def _begun(
@@ -64,4 +57,4 @@ def _begun(
     identity = f"{whose}/neighbours/{found.fault}/{when:.0f}"
     content = DiffersFromNeighbours(found, check.neighbours, check.nearest)
     notice = Notice(identity, identity, glider, state.checked, Kind.NEIGHBOURS, loud, loud, content)
-    return replace(state, id=identity, reported=found.fault, went=loud), [notice]
+    return replace(state, id=identity, since=state.checked), [notice]

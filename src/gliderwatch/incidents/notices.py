@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gliderwatch.fleet.advice import Advice
-from gliderwatch.fleet.cross_check import Fault, Hypothesis
+from gliderwatch.fleet.cross_check import Hypothesis
 from gliderwatch.model import (
     Assessment,
     Call,
@@ -318,15 +318,6 @@ class DiffersFromNeighbours:
     nearest: float
 
 
-@dataclass(frozen=True, slots=True)
-class FitsNeighbours:
-    """They fit again, at a surfacing ``t`` (s): there is no sign of the ``fault`` any more."""
-
-    fault: Fault
-    neighbours: tuple[str, ...]
-    t: float
-
-
 Content = (
     Opened
     | StillOpen
@@ -345,7 +336,6 @@ Content = (
     | SendsAgain
     | Irregularity
     | DiffersFromNeighbours
-    | FitsNeighbours
 )
 
 

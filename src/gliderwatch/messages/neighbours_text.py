@@ -1,4 +1,4 @@
-"""What people read when the currents of a glider do not fit those of its neighbours, and when they fit again.
+"""What people read when the currents of a glider do not fit those of its neighbours, and what to check.
 Pure."""
 
 from __future__ import annotations
@@ -6,7 +6,7 @@ from __future__ import annotations
 from math import degrees
 
 from gliderwatch.fleet.cross_check import Fault
-from gliderwatch.incidents.notices import DiffersFromNeighbours, FitsNeighbours
+from gliderwatch.incidents.notices import DiffersFromNeighbours
 from gliderwatch.messages.formatting import clean, utc
 from gliderwatch.messages.template import Page, Text
 
@@ -46,19 +46,11 @@ def differs(glider: str, content: DiffersFromNeighbours) -> Text:
                 "Compared with",
                 f"{_names(content.neighbours)}; the next is {content.nearest / 1e3:.0f} km away",
             ),
-            ("Evidence", f"a likelihood ratio of {found.ratio:.0f} (20 is enough)"),
+            ("Evidence", f"a likelihood ratio of {found.ratio:.0f}"),
         ),
         (("Check", _SHARED if shared else _CHECKS[found.fault]),),
     )
     return f"DIFFERS FROM NEIGHBOURS {name}: {what}", page
-
-
-def fits(glider: str, content: FitsNeighbours) -> Text:
-    """They fit again."""
-    name = clean(glider, 40)
-    lead = f"The currents of {name} fit those of its neighbours again ({_names(content.neighbours)})."
-    page = Page((lead,), (("Since", utc(content.t)), ("Was", _word(content.fault))))
-    return f"ALL CLEAR {name}: its currents fit those of its neighbours", page
 
 
 def _what(fault: Fault, size: float) -> str:
@@ -72,10 +64,6 @@ def _amount(fault: Fault, size: float, sigma: float) -> str:
         return f"{100 * size:.0f} % of its speed, +- {196 * sigma:.0f} % (95 %)"
     side = "too much" if size > 0 else "too little"
     return f"{abs(degrees(size)):.0f} degrees {side}, +- {1.96 * degrees(sigma):.0f} (95 %)"
-
-
-def _word(fault: Fault) -> str:
-    return "a loss of speed that it does not know of" if fault is Fault.LOSS else "a compass that is off"
 
 
 def _names(names: tuple[str, ...]) -> str:

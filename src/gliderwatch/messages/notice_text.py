@@ -39,7 +39,6 @@ _WRITERS: dict[type, Callable[[str, Any], Text]] = {
     n.CalledWithoutFile: call_text.without_file,
     n.SendsAgain: call_text.sends_again,
     n.DiffersFromNeighbours: neighbours_text.differs,
-    n.FitsNeighbours: neighbours_text.fits,
     n.Irregularity: lambda _, found: _of_operator(*irregularity_text.words(found), found.t),
 }
 """How each content of a notice reads, of which glider."""
