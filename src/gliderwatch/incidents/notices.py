@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gliderwatch.fleet.advice import Advice
+from gliderwatch.fleet.cross_check import Hypothesis
 from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.model import (
     Assessment,
@@ -306,6 +307,19 @@ class Irregularity:
     what: ClockStep | OldDates | TwoGliders
 
 
+# ----------------------------------------------------------------- neighbours
+
+
+@dataclass(frozen=True, slots=True)
+class DiffersFromNeighbours:
+    """The currents of a glider do not fit those of its ``neighbours``, of which the next is ``nearest`` (m)
+    away: ``found`` explains it. Where that is of no glider all have it alike."""
+
+    found: Hypothesis
+    neighbours: tuple[str, ...]
+    nearest: float
+
+
 Content = (
     Opened
     | StillOpen
@@ -323,6 +337,7 @@ Content = (
     | CalledWithoutFile
     | SendsAgain
     | Irregularity
+    | DiffersFromNeighbours
 )
 
 

@@ -14,6 +14,7 @@ from gliderwatch.incidents.aborts import Episode
 from gliderwatch.incidents.acknowledgement import Acks
 from gliderwatch.incidents.calls import Empty
 from gliderwatch.incidents.constants import FLOW_CHANGE, MARKS, NEWS, REGIME_DIVES, SLACK, SPEED_CHANGE, WEEK
+from gliderwatch.incidents.neighbours import Comparison
 from gliderwatch.incidents.notices import Cleared, Corrected, NewRegime, Notice, Opened, StillOpen, Surfaced
 from gliderwatch.incidents.overdue import Silence
 from gliderwatch.incidents.unjudged import Unknown
@@ -49,8 +50,9 @@ class NotificationState:
 
         ``surfaced`` is the surfacing of the last notice (s), ``silences`` what was sent of its staying away
     (`incidents.overdue`), ``unknown`` of dives that could not be judged (`incidents.unjudged`), ``aborts`` of
-    aborts (`incidents.aborts`), ``empty`` of calls without a file (`incidents.calls`), ``irregularities`` the
-    ids of those of its files, ``renewed`` the dive (s) of the last notice of a new way of flying.
+    aborts (`incidents.aborts`), ``empty`` of calls without a file (`incidents.calls`), ``neighbours`` how it
+    stood to them (`incidents.neighbours`), ``irregularities`` the ids of those of its files, ``renewed`` the
+    dive (s) of the last notice of a new way of flying.
     """
 
     threads: tuple[Thread, ...] = ()
@@ -60,6 +62,7 @@ class NotificationState:
     aborts: tuple[Episode, ...] = ()
     empty: Empty | None = None
     irregularities: tuple[str, ...] = ()
+    neighbours: Comparison | None = None
     renewed: float | None = None
 
 
@@ -162,7 +165,7 @@ def _new_regime(
 
 def unacknowledged(said: NotificationState, incidents: tuple[Incident, ...], acks: Acks) -> frozenset[str]:
     """The threads of what goes on and nobody has taken on: incidents, and gliders that stay away, cannot be
-    judged, have aborted, or call and send nothing."""
+    judged, have aborted, call and send nothing, or differ from their neighbours."""
     matched = _matched(said.threads, incidents)
     threads = {
         thread.id
@@ -176,6 +179,8 @@ def unacknowledged(said: NotificationState, incidents: tuple[Incident, ...], ack
     threads |= {episode.id for episode in said.aborts if episode.cleared is None}
     if said.empty is not None and not said.empty.is_over:
         threads.add(said.empty.id)
+    if said.neighbours is not None and said.neighbours.id:
+        threads.add(said.neighbours.id)
     return frozenset(threads | {silence.id for silence in said.silences if silence.called is None})
 
 

@@ -7,7 +7,10 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from gliderwatch.errors import GliderwatchError, NotAssessed
-from gliderwatch.incidents import aborts, irregularities, overdue, unjudged
+from gliderwatch.fleet.constants import CHECK_WINDOW
+from gliderwatch.fleet.cross_check import cross_check, current_of
+from gliderwatch.fleet.flow import DiveCurrent
+from gliderwatch.incidents import aborts, irregularities, neighbours, overdue, unjudged
 from gliderwatch.incidents import calls as without_files
 from gliderwatch.incidents.acknowledgement import with_mute
 from gliderwatch.incidents.constants import GONE
@@ -251,6 +254,26 @@ def _speak_of_calls(
     return replace(said, aborts=episodes, empty=empty), [*notices, *more]
 
 
+def _compare(
+    store: Store, said: NotificationState, last: Assessment | None, params: GliderParams
+) -> tuple[NotificationState, list[Notice]]:
+    """What is to be said of a glider beside its neighbours: once for each surfacing, by what was measured
+    until then. Only a glider that is compared with its own currents (`reference: dac`) has them in its
+    assessments.
+    """
+    before = said.neighbours
+    if last is None or params.reference != "dac" or (before is not None and before.checked >= last.t_surface):
+        return said, []
+    currents = list[DiveCurrent]()
+    for glider in store.gliders():
+        dives = store.surfaced_between(glider, last.t_surface - CHECK_WINDOW, last.t_surface)
+        each = map(current_of, dives, [None, *dives])
+        currents += [current for current in each if current is not None]
+    check = cross_check(currents, last.glider)
+    compared, notices = neighbours.announce(last.glider, before, check, last.t_surface)
+    return replace(said, neighbours=compared), notices
+
+
 def _due_messages(
     store: Store, glider: str, params: GliderParams, speaking: Routing | None, now: float
 ) -> tuple[Alert, ...]:
@@ -276,8 +299,9 @@ def _due_messages(
     blind, of_watch = unjudged.announce(said.unknown, known, attention, params.rules.reminder_hours, now)
     ids, of_files = irregularities.due(before.irregularities, known.irregularities(now), now)
     said = replace(said, unknown=blind, irregularities=ids)
+    said, of_fleet = _compare(store, said, last, params)
     said, of_calls = _speak_of_calls(said, known, now)
-    alerts = tuple(map(render, (*heard, *of_files, *of_incidents, *of_watch, *of_calls)))
+    alerts = tuple(map(render, (*heard, *of_files, *of_incidents, *of_watch, *of_fleet, *of_calls)))
     if said != before or alerts:
         post_alerts(store, glider, said, alerts, _channels(store, before.silences, speaking), now)
     return alerts

@@ -198,6 +198,14 @@ class Store:
             self._db, "SELECT data FROM assessments WHERE glider = ? ORDER BY t_dive", (glider,), Assessment
         )
 
+    def surfaced_between(self, glider: str, start: float, end: float) -> list[Assessment]:
+        """Those of a glider that ended between two times (s) with a fix, in order of time."""
+        sql = (
+            "SELECT data FROM assessments WHERE glider = ? AND ended = 1 AND t_surface BETWEEN ? AND ? "
+            "ORDER BY t_surface"
+        )
+        return values(self._db, sql, (glider, start, end), Assessment)
+
     def incidents(self, glider: str) -> list[Incident]:
         """All of a glider, in order of time."""
         return list(self.known(glider).incidents())
