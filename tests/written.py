@@ -2,15 +2,7 @@
 
 from __future__ import annotations
 
-from gliderwatch.incidents.notices import (
-    Cleared,
-    Content,
-    Corrected,
-    Notice,
-    Opened,
-    StillOpen,
-    Surfaced,
-)
+from gliderwatch.incidents.notices import Cleared, Content, Corrected, Notice, Opened, StillOpen, Surfaced
 from gliderwatch.messages.notice_text import render
 from gliderwatch.model import Alert, Assessment, Incident, Kind, NextSurfacing, Severity
 

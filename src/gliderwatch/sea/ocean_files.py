@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from gliderwatch.errors import GliderwatchError, Quarantine, Retry
 from gliderwatch.model import Array, readonly
-from gliderwatch.sea.ocean_field import STALE, Field
+from gliderwatch.sea.constants import STALE_FIELD
+from gliderwatch.sea.ocean_field import Field
 
 STANDARD = (
     ("eastward_sea_water_velocity", "northward_sea_water_velocity"),
@@ -63,7 +64,7 @@ class _Piece:
     v: Array
 
 
-def read_field(patterns: Sequence[str], area: Box | None = None, stale: float = STALE) -> Field:
+def read_field(patterns: Sequence[str], area: Box | None = None, stale: float = STALE_FIELD) -> Field:
     """The field of all files that match any of the shell ``patterns`` (``**``: folders of any depth).
 
     Files of several times are joined; of a time that several hold, the file whose name sorts last counts (the
