@@ -35,9 +35,6 @@ TESTS = {
     "forecast": "unit/test_heuristics_forecast unit/test_forecast_flow unit/test_forecast_steering"
     " unit/test_forecast_surfacing unit/test_forecast_timing unit/test_forecast_waypoints"
     " property/test_forecast",
-    "estimation": "unit/test_joint unit/test_flow unit/test_speed unit/test_baseline unit/test_reckoned"
-    " unit/test_range unit/test_sequential unit/test_learner unit/test_glider_estimate unit/test_pipeline",
-    "sea": "unit/test_currents_state unit/test_currents_field unit/test_currents_constituents",
     "incidents": "unit/test_heuristics_rules unit/test_announce unit/test_incident unit/test_silence"
     " unit/test_unknown unit/test_waiting",
 }

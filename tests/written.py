@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from gliderwatch.incidents.notices import Cleared, Content, Corrected, Notice, Opened, StillOpen, Surfaced
+from gliderwatch.incidents.notices import (
+    Cleared,
+    Content,
+    Corrected,
+    Notice,
+    Opened,
+    StillOpen,
+    Surfaced,
+)
 from gliderwatch.messages.notice_text import render
 from gliderwatch.model import Alert, Assessment, Incident, Kind, NextSurfacing, Severity
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gliderwatch.estimation import constants, healthy_baseline
+from gliderwatch.estimation import healthy_baseline
 from gliderwatch.estimation.healthy_baseline import Baseline, learn, told
 from gliderwatch.messages.evidence import usual
 from gliderwatch.model import Dive, DiveFeatures
@@ -157,7 +157,7 @@ def test_memory_is_bounded_and_survives_the_state_file() -> None:
     known = Baseline()
     for k in range(40):
         known = taught(healthy(30, seed=k, thruster=k / 40), known)
-    assert len(known.dives) <= constants.BASELINE_DIVES
+    assert len(known.dives) <= healthy_baseline.MOST
     assert not known.dives.flags.writeable
     again = codec.decode(codec.encode(known), Baseline)
     assert np.array_equal(again.dives, known.dives)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from gliderwatch.sea import flow_forecast
-from gliderwatch.sea.constants import SCORED_DIVES
 from gliderwatch.sea.flow_forecast import (
+    ENOUGH,
     TIDAL_GRID,
     Currents,
     Prediction,
@@ -198,7 +198,7 @@ def test_the_interval_that_hides_m2_is_told_where_it_is_kept():
         (Score(20, persistence=1.0, residual=0.9, tides=0.8, gain=0.2, gain_squared=0.05), "residual"),
         (Score(20, persistence=1.0, residual=1.1, tides=0.8, gain=0.2, gain_squared=0.05), "persistence"),
         (
-            Score(SCORED_DIVES - 1, persistence=1.0, residual=0.9, tides=0.1, gain=0.9, gain_squared=0.1),
+            Score(ENOUGH - 1, persistence=1.0, residual=0.9, tides=0.1, gain=0.9, gain_squared=0.1),
             "persistence",
         ),
     ],

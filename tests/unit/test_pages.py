@@ -18,7 +18,17 @@ from gliderwatch.incidents.notifications import NotificationState
 from gliderwatch.incidents.overdue import ExpectedCall
 from gliderwatch.incidents.whereabouts import whereabouts
 from gliderwatch.messages.samples import SAMPLES
-from gliderwatch.model import Alert, Assessment, Call, Fix, Happening, Incident, Kind, NextSurfacing, Severity
+from gliderwatch.model import (
+    Alert,
+    Assessment,
+    Call,
+    Fix,
+    Happening,
+    Incident,
+    Kind,
+    NextSurfacing,
+    Severity,
+)
 from gliderwatch.navigation.geodesy import to_plane
 from gliderwatch.pages import writing
 from gliderwatch.pages.reading import SHOWN

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gliderwatch.estimation.constants import FASTEST_GLIDER
+from gliderwatch.estimation.modes import FASTEST
 from gliderwatch.estimation.speed_range import Normal, RangeParams, learn, setting, speed_range
 from gliderwatch.model import DiveFeatures, readonly
 
@@ -80,7 +80,7 @@ def test_stronger_setting_is_held_against_the_weaker_ones():
     normal = learnt([0.54] * 5, at=0.14, normal=learnt([0.33] * 5))
     found = speed_range(normal, 0.5, PARAMS)
     assert found.low == speed_range(normal, 0.14, PARAMS).low
-    assert found.high == FASTEST_GLIDER
+    assert found.high == FASTEST
     assert speed_range(learnt([0.54] * 5, at=0.3), 0.0, PARAMS) is None  # a weaker one says nothing
 
 

@@ -3,8 +3,16 @@ import math
 import numpy as np
 import pytest
 
-from gliderwatch.estimation.constants import STEP_WINDOW
-from gliderwatch.estimation.step_test import Bank, Update, advance, cusum, cusum_bound, likeliest, ratio_bound
+from gliderwatch.estimation.step_test import (
+    WINDOW,
+    Bank,
+    Update,
+    advance,
+    cusum,
+    cusum_bound,
+    likeliest,
+    ratio_bound,
+)
 
 N, M, Q = 3, 2, 2
 SHAPE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
@@ -87,7 +95,7 @@ def test_likeliest_finds_dive_and_size_of_a_step():
 
 def test_bank_forgets_old_dives(z):
     bank = banked(filtered(np.tile(z, (3, 1)))[1], np.eye(2))
-    assert len(bank.score) == STEP_WINDOW
+    assert len(bank.score) == WINDOW
     assert likeliest(Bank(), 0) is None
 
 

@@ -29,7 +29,7 @@ from gliderwatch.fleet.constants import APART
 from gliderwatch.incidents import send_schedule
 from gliderwatch.model import Severity
 from gliderwatch.params import AnomalyRule, Attention, FalseAlarmRule, GliderParams, LearnerParams, RuleParams
-from gliderwatch.sea.constants import STALE_FIELD
+from gliderwatch.sea.ocean_field import STALE
 
 # ----------------------------------------
 # The sections of the settings that are of gliders, as frozen pydantic models.
@@ -317,8 +317,7 @@ class Ocean(Section):
     )
     area: BoxSetting | None = Field(default=None, description="The part to read; null: all of the files.")
     stale_hours: Annotated[Number, Field(gt=0, le=8760)] = Field(
-        default=STALE_FIELD / 3600,
-        description="Hours beyond the last time of the files until which it is used.",
+        default=STALE / 3600, description="Hours beyond the last time of the files until which it is used."
     )
 
 

@@ -13,7 +13,6 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from gliderwatch.estimation.constants import FORGOTTEN_WIDTHS, LATEST_CURRENT, STALE_LEARNER, WARM_UP
 from gliderwatch.estimation.speed_range import Normal, RangeParams, learn, setting, speed_range
 from gliderwatch.estimation.unassessed import Reference, unassessed
 from gliderwatch.model import Array, Assessment, Current, Dive, Fix, Flag, Track, readonly
@@ -23,6 +22,15 @@ from gliderwatch.papers.basis import new_centres, phi
 from gliderwatch.papers.flags import FlowMaxima, flag, p_e, update
 from gliderwatch.papers.learner import AdaptiveInfo, AdaptiveParams, AdaptiveState, advance, init, with_basis
 from gliderwatch.params import GliderParams
+
+WARM_UP = 3.0
+"""Time constants K/gamma of the speed law: by then 95 % of an error of the first guess is gone."""
+STALE = 12 * 3600.0
+"""Seconds without a usable dive after which the sea may be another: the learner warms up anew."""
+LATEST = 12 * 3600.0
+"""Seconds for which the current of an earlier dive stands in for one that has not come yet."""
+FORGOTTEN = 6.0
+"""Widths sigma behind the glider at which a basis function that was placed on the way is let go."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,14 +135,14 @@ def _reference(state: Learner, dive: Dive) -> tuple[Current | None, bool]:
     """The current to compare with, and whether it is that of an earlier dive, for want of its own."""
     if dive.current is not None:
         return dive.current, False
-    recent = state.current is not None and dive.t_surface - state.current_t < LATEST_CURRENT
+    recent = state.current is not None and dive.t_surface - state.current_t < LATEST
     return (state.current, True) if recent else (None, False)
 
 
 def _begin(state: Learner, dive: Dive, start: Fix, params: GliderParams) -> Learner:
     """A new estimate at the start of a deployment, else the state as it is."""
     if state.learner is not None and state.end is not None:
-        return state if dive.t_dive - state.end.t < STALE_LEARNER else replace(state, warm=0.0)
+        return state if dive.t_dive - state.end.t < STALE else replace(state, warm=0.0)
     closed = closure(dive.track, dive.current) if dive.track and dive.current else None
     speed = closed.along_speed if closed is not None else dive.features.onboard_speed
     if speed is None or not 0.0 < speed < 2 * params.speed_max:
@@ -150,7 +158,7 @@ def _covering(
     assert state.learner is not None
     sigma, planned = params.learner.sigma, len(params.learner.centres)
     centres = to_plane(state.centres[:, 0], state.centres[:, 1], start.lat, start.lon)
-    near = np.hypot(*(centres - track.x[-1]).T) < FORGOTTEN_WIDTHS * sigma
+    near = np.hypot(*(centres - track.x[-1]).T) < FORGOTTEN * sigma
     near[:planned] = True
     added = new_centres(centres[near], track.x, sigma)
     learner = with_basis(_with_only(state.learner, near), len(added))

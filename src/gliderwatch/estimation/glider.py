@@ -9,7 +9,7 @@ import numpy as np
 
 from gliderwatch.estimation import adaptive
 from gliderwatch.estimation.adaptive import Learner
-from gliderwatch.estimation.constants import CURRENT_ERROR, PROVISIONAL_ERROR, REFERENCE_APART
+from gliderwatch.estimation.dive_measurement import PROVISIONAL, REPORTED
 from gliderwatch.estimation.healthy_baseline import Baseline, learn, told
 from gliderwatch.estimation.kalman import JointEstimate, JointInfo, JointParams, expected_flow
 from gliderwatch.estimation.speed_range import RangeParams
@@ -26,6 +26,9 @@ from gliderwatch.sea.ocean_field import Field
 
 # ----------------------------------------
 # What the joint estimator says of a dive, as an assessment.
+
+APART = 16.0
+"""Squared misfit of flow and reference, in standard errors, that is no chance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +105,7 @@ def _apart(found: JointEstimate, other: Reference) -> bool:
     """Whether flow and reference differ by more than the errors of both."""
     assert other.current is not None
     miss = found.flow - np.array([other.current.u, other.current.v])
-    return float(miss @ np.linalg.solve(found.flow_cov + other.cov, miss)) > REFERENCE_APART
+    return float(miss @ np.linalg.solve(found.flow_cov + other.cov, miss)) > APART
 
 
 def _notes(dive: Dive, current: Current | None, other: Reference | None) -> tuple[str, ...]:
@@ -196,7 +199,7 @@ def _with_currents(state: Estimate, dive: Dive, params: GliderParams, flag: int 
     if params.reference != "tides" or current is None or flag == Flag.FALSE_ALARM:
         return state
     assert dive.start is not None and dive.end is not None
-    error = CURRENT_ERROR if current.final else PROVISIONAL_ERROR
+    error = REPORTED if current.final else PROVISIONAL
     flow = np.array([current.u, current.v])
     known = currents.learn(state.currents, dive.start.t, dive.end.t, flow, error)
     return replace(state, currents=known)

@@ -16,19 +16,22 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from gliderwatch.estimation.constants import (
-    BASELINE_DIVES,
-    BRIEF_DIVE,
-    FIRST_DIVES,
-    LEAST_BASELINE,
-    LIKE_SETTING,
-    MAD_TO_SIGMA,
-    RANGE_WIDTH,
-    RECENT_DIVES,
-    SHORTEST_TAUGHT,
-)
+from gliderwatch.estimation.kinematic_speed import MAD_TO_SIGMA
+from gliderwatch.estimation.speed_range import LIKE
 from gliderwatch.model import Array, DiveFeatures, readonly
 from gliderwatch.navigation.features import evidence
+
+FIRST, RECENT = 12, 12
+"""Healthy dives kept of those at a like setting of the thruster: the first and the latest."""
+MOST = 144
+"""Dives kept of all settings: six settings' worth."""
+LEAST = 5
+"""Dives that tell what is usual."""
+SHORTEST, BRIEF = 3600.0, 1800.0
+"""s: a shorter dive teaches nothing, because after launch pilots try out the ballast; and one so short that
+its numbers are those of its turns is not compared."""
+WIDTH = 4.0
+"""Half width of a range in robust standard deviations."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,21 +93,21 @@ def learn(baseline: Baseline, features: DiveFeatures) -> Baseline:
 
     A new deployment begins with ``Baseline()``.
     """
-    if features.duration < SHORTEST_TAUGHT:
+    if features.duration < SHORTEST:
         return baseline
     row = _row(features)
     dives = np.concatenate([_dives(baseline), row[None]])
     alike = np.flatnonzero(_same_setting(dives, row))
-    if len(alike) > FIRST_DIVES + RECENT_DIVES:
-        dives = np.delete(dives, alike[FIRST_DIVES], axis=0)
-    dives = dives[-BASELINE_DIVES:]
+    if len(alike) > FIRST + RECENT:
+        dives = np.delete(dives, alike[FIRST], axis=0)
+    dives = dives[-MOST:]
     known = np.isfinite(dives)
     return Baseline(readonly(np.where(known, dives, 0.0)), readonly(known))
 
 
 def compare(baseline: Baseline, features: DiveFeatures) -> dict[str, Usual]:
     """The numbers of a dive of which enough healthy dives tell what is usual, by name."""
-    if features.duration < BRIEF_DIVE:
+    if features.duration < BRIEF:
         return {}
     row = _row(features)
     dives = _dives(baseline)
@@ -170,7 +173,7 @@ def _row(features: DiveFeatures) -> Array:
 def _same_setting(dives: Array, row: Array) -> NDArray[np.bool_]:
     """Which dives were flown with the thruster like this one: buoyancy alone is like nothing else."""
     at = _COLUMN["thruster"]
-    return np.asarray((np.abs(dives[:, at] - row[at]) < LIKE_SETTING) & ((dives[:, at] > 0) == (row[at] > 0)))
+    return np.asarray((np.abs(dives[:, at] - row[at]) < LIKE) & ((dives[:, at] > 0) == (row[at] > 0)))
 
 
 def _usual(values: list[float], same: list[bool], quantity: Quantity) -> tuple[float, float, float] | None:
@@ -179,13 +182,13 @@ def _usual(values: list[float], same: list[bool], quantity: Quantity) -> tuple[f
     ``values`` of each dive, NaN where it does not tell; ``same``: whether it was at the same trim.
     """
     known = [value for value in values if isfinite(value)]
-    windows = [known[:FIRST_DIVES], known[-RECENT_DIVES:]]
+    windows = [known[:FIRST], known[-RECENT:]]
     if quantity.given:
         alike = [each for value, each in zip(values, same, strict=True) if isfinite(value)]
-        first = list(compress(known[:FIRST_DIVES], alike))
+        first = list(compress(known[:FIRST], alike))
         # the first dives alone, so that what grows slowly is not usual in the end
-        windows = [first if len(first) >= LEAST_BASELINE else list(compress(known, alike))]
-    if len(windows[-1]) < LEAST_BASELINE:
+        windows = [first if len(first) >= LEAST else list(compress(known, alike))]
+    if len(windows[-1]) < LEAST:
         return None
     ranges = [_range(values, quantity) for values in windows]
     return min(low for low, _, _ in ranges), ranges[-1][1], max(high for _, _, high in ranges)
@@ -203,6 +206,6 @@ def _same_trim(dives: Array, row: Array, given: tuple[str, ...]) -> list[bool]:
 
 def _range(values: list[float], quantity: Quantity) -> tuple[float, float, float]:
     usual = median(values)  # of a dozen values: numpy's is for thousands
-    spread = RANGE_WIDTH * MAD_TO_SIGMA * median([abs(value - usual) for value in values])
+    spread = WIDTH * MAD_TO_SIGMA * median([abs(value - usual) for value in values])
     half = max(spread, quantity.least, quantity.part * abs(usual))
     return usual - half, usual, usual + half

@@ -9,20 +9,8 @@ from functools import cache
 import numpy as np
 
 from gliderwatch.estimation import step_test
-from gliderwatch.estimation.constants import (
-    FAR_INNOVATION,
-    FASTEST_GLIDER,
-    FIRST_NOISE_DIVES,
-    LEAST_SLIP,
-    LEAST_TESTED_SCALE,
-    MEASUREMENT_SCALES,
-    MOST_SIDE,
-    MOST_SLIP,
-    NOISE_MEMORY,
-    PROCESS_SCALES,
-    RARE_MODE,
-)
 from gliderwatch.estimation.dive_measurement import (
+    FASTEST,
     OWN,
     SHOWN,
     SIDE,
@@ -43,6 +31,18 @@ from gliderwatch.sea.gauss_markov import FlowParams, Passage
 # ----------------------------------------
 # How restless the sea and how good the data are, learnt from what the innovations are.
 
+MEMORY, FEW = 40, 6
+"""Dives over which noise is learnt, and how many the first guess of it counts for."""
+FAR = 4.0
+"""A normalised square above this counts as this much, so that a fault does not pass for noise."""
+SEA, DOUBT = (0.1, 40.0), (0.02, 9.0)
+"""Bounds of the factors on the variance of the flow's changes and of the measurements. The noise of a current
+is 0.6 cm/s before anything is learnt; on the real missions at hand it is about that, and a tenth of it where
+compass, pitch and fixes are as good as simulated ones."""
+LEAST_DOUBT = 0.25
+"""What the tests take the factor on the measurements for, at least: data that were better than usual until
+now do not make a fault of the first dive that is as usual."""
+
 
 def learn_process_scale(factor: float, square: float | None, share: float, dives: int) -> float:
     """The factor on the variance of the flow's changes after the ``square`` of one more innovation.
@@ -54,20 +54,20 @@ def learn_process_scale(factor: float, square: float | None, share: float, dives
     >>> round(learn_process_scale(1.0, 2.0, 0.5, dives=4), 3)
     1.2
     """
-    return _within(factor * (1 + 2 * min(2 * share, 1.0) * _part(dives) * _excess(square)), PROCESS_SCALES)
+    return _within(factor * (1 + 2 * min(2 * share, 1.0) * _part(dives) * _excess(square)), SEA)
 
 
 def learn_measurement_scale(factor: float, square: float | None, dives: int) -> float:
     """The factor on the variance of the measurements, likewise."""
-    return _within(factor * (1 + _part(dives) * _excess(square)), MEASUREMENT_SCALES)
+    return _within(factor * (1 + _part(dives) * _excess(square)), DOUBT)
 
 
 def _part(dives: int) -> float:
-    return 1 / min(dives + FIRST_NOISE_DIVES, NOISE_MEMORY)
+    return 1 / min(dives + FEW, MEMORY)
 
 
 def _excess(square: float | None) -> float:
-    return 0.0 if square is None else min(square, FAR_INNOVATION) - 1
+    return 0.0 if square is None else min(square, FAR) - 1
 
 
 def _within(value: float, bounds: tuple[float, float]) -> float:
@@ -83,6 +83,13 @@ def _within(value: float, bounds: tuple[float, float]) -> float:
 # only where the flow lasts while the heading turns. A test for a step (`estimation.step_test`) looks for it;
 # when it speaks, slip and side are opened by as much as the step is uncertain, within what a wing or a
 # compass can do.
+
+LEAST_SLIP, MOST_SLIP, MOST_SIDE = -0.1, 0.95, 0.85
+"""What slip of the state can be: on board at most a tenth of W too much is allowed for the angle of attack,
+and a glider does not fly backwards. A compass, or a bent wing, that turns the way by more than a radian (its
+sine) is not thought of."""
+RARE = 0.01
+"""Weight of a mode below which it is left out of the mixture."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +140,7 @@ class JointState:
     @property
     def tested(self) -> float:
         """The factor on the variance of the measurements with which dives are tested."""
-        return max(self.measurement_scale, LEAST_TESTED_SCALE)
+        return max(self.measurement_scale, LEAST_DOUBT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,7 +330,7 @@ def _cov(state: JointState, way: Explained, steps: Array) -> Array:
 
 def _mixed(state: JointState, ways: list[Explained], steps: Array) -> JointState:
     """The state after a dive: the mixture of what it is under each explanation."""
-    kept = [way for way in ways if way.weight > RARE_MODE]
+    kept = [way for way in ways if way.weight > RARE]
     total = sum(way.weight for way in kept)
     means, covs = [], []
     for way in kept:
@@ -340,7 +347,7 @@ def _mixed(state: JointState, ways: list[Explained], steps: Array) -> JointState
 def _bounded(x: Array) -> Array:
     """The state within what speed, slip and side can be."""
     x = x.copy()
-    x[OWN] = min(max(x[OWN], 0.0), FASTEST_GLIDER)
+    x[OWN] = min(max(x[OWN], 0.0), FASTEST)
     x[SLIP] = min(max(x[SLIP], LEAST_SLIP), MOST_SLIP)
     x[SIDE] = min(max(x[SIDE], -MOST_SIDE), MOST_SIDE)
     return x
@@ -376,7 +383,7 @@ def _learnt(
 def _across(
     state: JointState, seen: Observation, believed: tuple[float, float] | None
 ) -> tuple[float, float] | None:
-    about = believed[0] if believed is not None and 0 < believed[0] < FASTEST_GLIDER else float(state.x[OWN])
+    about = believed[0] if believed is not None and 0 < believed[0] < FASTEST else float(state.x[OWN])
     found = seen.across(about)
     return None if found is None else (found[0], found[1] * math.sqrt(state.tested))
 

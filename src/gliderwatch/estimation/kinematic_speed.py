@@ -12,14 +12,16 @@ from dataclasses import dataclass
 from math import tan
 from statistics import median
 
-from gliderwatch.estimation.constants import (
-    FEW_RATIOS,
-    FLATTEST_PITCH,
-    MAD_TO_SIGMA,
-    RATIOS_KEPT,
-    SHORTEST_FOR_RATIO,
-)
 from gliderwatch.model import DiveFeatures
+
+KEPT, FEW = 12, 3
+"""Healthy dives from which a ratio is learnt, at most and at least."""
+SHORTEST = 3600.0
+"""s: on a shorter dive the turns and the surface take too much of the time."""
+FLATTEST = 0.15
+"""rad: below this pitch its tangent says too little."""
+MAD_TO_SIGMA = 1.4826
+"""Standard deviation of normal numbers by their median absolute deviation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +67,7 @@ def vertical(features: DiveFeatures) -> float | None:
         (features.depth_rate_dive, features.pitch_dive),
         (features.depth_rate_climb, features.pitch_climb),
     ):
-        if rate is None or pitch is None or abs(pitch) < FLATTEST_PITCH or rate == 0:
+        if rate is None or pitch is None or abs(pitch) < FLATTEST or rate == 0:
             return None
         slowness.append(tan(abs(pitch)) / abs(rate))
     return 2 / sum(slowness)
@@ -73,7 +75,7 @@ def vertical(features: DiveFeatures) -> float | None:
 
 def learn(ratios: Ratios, features: DiveFeatures, own: float) -> Ratios:
     """The ratios with those of one more healthy dive, of which W is known (m/s)."""
-    if features.duration < SHORTEST_FOR_RATIO:
+    if features.duration < SHORTEST:
         return ratios
     return Ratios(
         _with(ratios.vertical, vertical(features), own),
@@ -83,7 +85,7 @@ def learn(ratios: Ratios, features: DiveFeatures, own: float) -> Ratios:
 
 def kinematic_speed(ratios: Ratios, features: DiveFeatures) -> KinematicSpeed | None:
     """W as a dive tells it; None where it does not."""
-    if features.duration < SHORTEST_FOR_RATIO:
+    if features.duration < SHORTEST:
         return None
     for source, value, known in (
         (VERTICAL, vertical(features), ratios.vertical),
@@ -97,12 +99,12 @@ def kinematic_speed(ratios: Ratios, features: DiveFeatures) -> KinematicSpeed | 
 
 
 def _with(ratios: tuple[float, ...], value: float | None, own: float) -> tuple[float, ...]:
-    return ratios if value is None or not value > 0 else (*ratios, own / value)[-RATIOS_KEPT:]
+    return ratios if value is None or not value > 0 else (*ratios, own / value)[-KEPT:]
 
 
 def _ratio(source: Source, known: tuple[float, ...]) -> tuple[float, float] | None:
     """The ratio of W to a speed, and its standard error as a part of it."""
-    if len(known) < FEW_RATIOS:
+    if len(known) < FEW:
         return source.first
     ratio = median(known)
     spread = MAD_TO_SIGMA * median(abs(each / ratio - 1) for each in known)

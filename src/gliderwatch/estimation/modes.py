@@ -16,9 +16,18 @@ from math import log, pi, sqrt
 
 import numpy as np
 
-from gliderwatch.estimation.constants import BEYOND_FLIGHT, FASTEST_GLIDER, FAULT_STAYS, ITERATIONS, LEFT_OUT
-from gliderwatch.estimation.dive_measurement import OWN, SIDE, SLIP, Measured, expected
+from gliderwatch.estimation.dive_measurement import FASTEST, OWN, SIDE, SLIP, Measured, expected
 from gliderwatch.model import Array
+
+ITERATIONS = 2
+BEYOND = 0.02
+"""m/s by which a speed may be found beyond what a glider can fly, before that speaks against an
+explanation."""
+STAYS = 0.6
+"""Chance that a current, or a ground velocity, which is wrong on one dive is wrong on the next one too: a
+fault lasts."""
+LEFT_OUT = 10.0
+"""m/s: error given to a measurement that is wrong: it is left out, be it as near as it may."""
 
 
 class Cause(StrEnum):
@@ -66,7 +75,7 @@ def switched(modes: tuple[Mode, ...], before: Mapping[Cause, float]) -> tuple[Mo
     """The modes with the chances that they have after a dive which was explained so ``before``: what is
     wrong stays."""
     rare = {
-        mode.cause: max(mode.chance, FAULT_STAYS * before.get(mode.cause, 0.0))
+        mode.cause: max(mode.chance, STAYS * before.get(mode.cause, 0.0))
         for mode in modes
         if mode.cause.is_error
     }
@@ -131,10 +140,10 @@ def explain(
         innovation = values - found - (slope @ (x - state)[:, :, None])[:, :, 0]
         state = x + (turned @ (inverse @ innovation[:, :, None]))[:, :, 0]
         free = state[:, OWN].copy()
-        state[:, OWN] = np.clip(free, 0.0, FASTEST_GLIDER)
+        state[:, OWN] = np.clip(free, 0.0, FASTEST)
         state[:, SLIP:] = np.clip(state[:, SLIP:], [-0.1, -0.85], [0.95, 0.85])
-    beyond = np.maximum(np.maximum(-free, free - FASTEST_GLIDER), 0.0)
-    logs = logs - 0.5 * (beyond / BEYOND_FLIGHT) ** 2
+    beyond = np.maximum(np.maximum(-free, free - FASTEST), 0.0)
+    logs = logs - 0.5 * (beyond / BEYOND) ** 2
     squares = np.einsum("ki,kij,kj->k", innovation, inverse, innovation)
     logs = logs - 0.5 * (np.linalg.slogdet(s)[1] + squares)
     weights = np.exp(logs - logs.max())
@@ -172,6 +181,6 @@ def _opened(
         if tells is not None:
             logs[k] += log(1 - tells.lies) if believes else log(tells.lies)
             if not believes:  # it may be anything: of density 1 / FASTEST
-                wrong[k, -1, -1] = FASTEST_GLIDER**2
+                wrong[k, -1, -1] = FASTEST**2
                 logs[k] += log(sqrt(2 * pi))
     return opened, wrong, logs

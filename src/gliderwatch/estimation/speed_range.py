@@ -13,8 +13,12 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from gliderwatch.estimation.constants import FASTEST_GLIDER, LIKE_SETTING, MAD_TO_SIGMA
+from gliderwatch.estimation.dive_measurement import FASTEST
+from gliderwatch.estimation.kinematic_speed import MAD_TO_SIGMA
 from gliderwatch.model import Array, DiveFeatures, readonly
+
+LIKE = 0.1
+"""Settings of a thruster (0 to 1) that differ by less are alike."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,11 +104,11 @@ def speed_range(normal: Normal, at: float, params: RangeParams) -> SpeedRange | 
         return None
     strongest = np.sort(normal.settings[weaker])[-params.least]
     found = _range(normal.speeds[weaker & (normal.settings >= strongest)], params)
-    return SpeedRange(found.low, found.usual, FASTEST_GLIDER, found.dives)
+    return SpeedRange(found.low, found.usual, FASTEST, found.dives)
 
 
 def _alike(normal: Normal, at: float) -> NDArray[np.bool_]:
-    return np.asarray((np.abs(normal.settings - at) < LIKE_SETTING) & ((normal.settings > 0) == (at > 0)))
+    return np.asarray((np.abs(normal.settings - at) < LIKE) & ((normal.settings > 0) == (at > 0)))
 
 
 def _range(speeds: Array, params: RangeParams) -> SpeedRange:

@@ -8,7 +8,6 @@ from functools import cache
 
 import numpy as np
 
-from gliderwatch.estimation.constants import CALIBRATED, FAR_STEP_INNOVATION, STEP_SIZE, STEP_WINDOW
 from gliderwatch.estimation.dive_measurement import SIDE, SLIP
 from gliderwatch.model import Array, readonly
 
@@ -19,6 +18,16 @@ from gliderwatch.model import Array, readonly
 # of every recent dive whether a step in the state of a Kalman filter, begun just before that dive, explains
 # the innovations since. `cusum` is Page's (1954): it adds up small departures of one number in one
 # direction. Both are set by how often they may cry wolf.
+
+WINDOW = 24
+"""Dives that a step may lie back, some three days: by then the flow has forgotten what it was before."""
+CALIBRATED = (0.5, 10.0, 4.0)
+"""Alarms a healthy glider gives in a month at a ratio, that ratio, and by how much it must rise for a factor
+e fewer. Fitted to what `python benchmarks/joint.py calibrate` printed (74 glider-months, seven kinds of sea):
+
+    ratio above     8     10    12    14    16    18    20    24
+    alarms a month  .89   .43   .30   .20   .11   .068  .027  .014
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +99,7 @@ def advance(bank: Bank, shape: Array, precision: Array, kept: Array, update: Upd
     before, ``kept`` ((n, n)) the transition to the dive.
     """
     n, q = shape.shape
-    old = 1 - STEP_WINDOW
+    old = 1 - WINDOW
     shift = np.concatenate([kept @ bank.shift.reshape(-1, n, q)[old:], shape[None]])
     info = np.concatenate([bank.info.reshape(-1, q, q)[old:], precision[None]])
     score = np.concatenate([bank.score.reshape(-1, q)[old:], np.zeros((1, q))])
@@ -177,6 +186,11 @@ def cusum_bound(slack: float, dives_between_alarms: float) -> float:
 # ----------------------------------------
 # Losses that the glider does not know of: steps in slip (a lost or bent wing) and side (a compass).
 
+LARGEST = 0.5
+"""Usual size of a step in slip or side (parts of W)."""
+MOST = 4.0
+"""Standard errors: an innovation that is longer counts as this long."""
+
 
 def steps(
     bank: Bank, matrix: Array, update: Update, jump: Array, front: float
@@ -190,9 +204,9 @@ def steps(
     shape = np.zeros((len(matrix), 4))
     shape[[SLIP, SIDE], [0, 1]] = 1.0
     shape[:, 2:] = jump
-    sizes = np.array([STEP_SIZE, STEP_SIZE, front, front])
+    sizes = np.array([LARGEST, LARGEST, front, front])
     square = float(update.innovation @ update.weight @ update.innovation)
-    believed = update.innovation * min(1.0, FAR_STEP_INNOVATION / math.sqrt(max(square, 1e-12)))
+    believed = update.innovation * min(1.0, MOST / math.sqrt(max(square, 1e-12)))
     bank = advance(bank, shape, np.diag(sizes**-2), matrix, replace(update, innovation=believed))
     return likeliest(bank, 0, sign=1), likeliest(bank, 1), bank
 

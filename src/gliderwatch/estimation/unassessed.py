@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gliderwatch.estimation.constants import MODEL_DEPTH, MODEL_ERROR
 from gliderwatch.model import Array, Assessment, Current, Dive, Fix
 from gliderwatch.navigation.features import evidence
 from gliderwatch.navigation.track import closure
@@ -60,6 +59,11 @@ def unassessed(dive: Dive, params: GliderParams, digest: str, reason: str) -> As
 # ----------------------------------------
 # The reference flow F_M of a dive, where it is another than the dive's own current.
 
+MODEL_ERROR = 0.1
+"""m/s, a component: usual error of an ocean model or a radar beside a glider's mean current."""
+SHALLOW = 30.0
+"""Metres to which a model is averaged where the depth of the dive is not known."""
+
 
 @dataclass(frozen=True, slots=True)
 class Reference:
@@ -94,12 +98,12 @@ def of_model(ocean: Field | None, dive: Dive, start: Fix, end: Fix) -> Reference
     if ocean is None:
         return _none("the files of the ocean model could not be read")
     depth = dive.features.depth_max
-    found = ocean.between(start, end, MODEL_DEPTH if depth is None else depth)
+    found = ocean.between(start, end, SHALLOW if depth is None else depth)
     if isinstance(found, str):
         return _none(found)
     note = f"reference flow: {ocean.source}"
     if depth is None:
-        note += f", mean of the upper {MODEL_DEPTH:.0f} m because the depth of the dive is not known"
+        note += f", mean of the upper {SHALLOW:.0f} m because the depth of the dive is not known"
     return Reference(_current(np.array(found)), MODEL_ERROR**2 * np.eye(2), (note,))
 
 

@@ -11,26 +11,7 @@ from statistics import median
 import numpy as np
 
 from gliderwatch.estimation import kalman
-from gliderwatch.estimation.constants import (
-    CLEARLY_BETTER,
-    DEPARTURE,
-    DIVES_A_MONTH,
-    EXPLAINED_BY_TRIM,
-    HIDDEN,
-    MISFITS_KEPT,
-    OWN_SURE,
-    REGIME_AGREES,
-    REGIME_DIVES,
-    ROLL_CONFIRMS,
-    ROLL_STEP,
-    SLACK_DEPARTURES,
-    TRIM_CHANGE,
-    TURNED,
-    USUAL_DIVE,
-    USUAL_PITCH,
-    USUAL_ROLLS,
-)
-from gliderwatch.estimation.dive_measurement import slip_at
+from gliderwatch.estimation.dive_measurement import USUAL_PITCH, slip_at
 from gliderwatch.estimation.kalman import JointInfo, JointParams, JointState
 from gliderwatch.estimation.kinematic_speed import KinematicSpeed, Ratios, kinematic_speed
 from gliderwatch.estimation.kinematic_speed import learn as learn_ratios
@@ -54,6 +35,13 @@ from gliderwatch.model import Array, Dive, Flag
 # heading, at any speed. What is left across the heading has no other cause than a measurement that is
 # wrong: the current, the fixes, or the headings (compass, declination). A current that is wrong on many dives
 # alike stays where it is when the glider turns; a heading that is wrong turns with it.
+
+KEPT = 8
+"""Dives back over which a current is told from a compass."""
+CLEARLY = 6.0
+"""By how much the chi-square of one explanation has to be below that of the other."""
+TURNED = math.radians(45)
+"""By how much the glider must have turned before the two can differ."""
 
 
 class Blame(StrEnum):
@@ -118,9 +106,9 @@ def blame(history: tuple[Misfit, ...], gate: float, least: float) -> Blame:
     if np.abs(np.angle(np.exp(1j * (angles[:, None] - angles)))).max() < TURNED:
         return Blame.UNCLEAR
     turned, shifted = _chi_squares(row, angles)
-    if shifted + 2 < turned - CLEARLY_BETTER:
+    if shifted + 2 < turned - CLEARLY:
         return Blame.CURRENT
-    return Blame.COMPASS if turned < shifted + 2 - CLEARLY_BETTER else Blame.UNCLEAR
+    return Blame.COMPASS if turned < shifted + 2 - CLEARLY else Blame.UNCLEAR
 
 
 def _chi_squares(row: list[Misfit], angles: Array) -> tuple[float, float]:
@@ -144,13 +132,34 @@ def _left(shape: Array, across: Array, sigma: Array) -> float:
 # Flag 2: a measurement is wrong. Flag 1: the glider is slower than normal (or faster than configured), at
 # once or by evidence over several dives. No flag: its speed cannot be known from this dive, and why.
 
+DIVES_A_MONTH, USUAL_DIVE = 240.0, 3 * 3600.0
+"""Dives of 3 h in 30 days, and that time in s: of shorter dives each counts for less."""
+DEPARTURE, SLACK = 0.08, 1.0
+"""Part of the usual speed by which a healthy glider's speed varies at least, for the sum of small losses;
+and how many times that does not add to the sum."""
+OWN_SURE = 0.15
+"""Standard error of W on a dive, as part of it, up to which the dive tells what W is to what is reported."""
 NOT_SEEN = "it turned, and its heading is not in the file: the speed cannot be told"
+ROLL_CONFIRMS = 0.67
+"""Standard errors by which a speed must be below normal where the glider rolls otherwise for two dives:
+three to one."""
 FASTER = "faster than ever: the current is wrong, or it is driven harder"
 NEW_FASTER = "faster than before: a new way of flying, or the current is wrong: the next dives will tell"
 NEW_SLOWER = "slower than before, after a change of pitch or ballast: the next dives will tell"
 NEW_WAY = "flies in a new way for three dives: "
+HIDDEN = 0.1
+"""Part of the speed that the glider believes, by which it must be slower to be slower than that."""
+ROLLED, ROLLS = 0.12, 5
+"""rad: a step of the mean roll that speaks for a lost or bent wing; dives that tell the usual roll, and
+samples that tell the roll of a dive."""
 Trim = tuple[float | None, ...]
 """What a pilot chooses of a dive: pitch diving and climbing (rad), volume pumped diving and climbing (m3)."""
+AGREE, ENOUGH = 0.12, 3
+"""Part of it by which speeds of a new way of flying differ at most, and dives in a row that make it one."""
+EXPLAINED = 0.7
+"""Part of the usual speed that is left at least after a change of trim: pitch and ballast take no more."""
+RETRIMMED = (0.08, 0.08, 30e-6, 30e-6)
+"""Change of each number of the trim that was the pilot's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,14 +277,14 @@ def _regime(
     """
     speed, learning = info.estimate.speed, params.learning
     faster = reason == FASTER
-    explained = speed > EXPLAINED_BY_TRIM * normal.usual and retrimmed(state.trim, _trim(dive))
+    explained = speed > EXPLAINED * normal.usual and retrimmed(state.trim, _trim(dive))
     slower = flag is Flag.ANOMALY and explained and told is not None and info.believes
     if learning is None or not normal.dives or not (faster or slower):
         return (replace(state, other=()) if state.other else state), flag, reason, normal
     if faster and told is not None and not info.believes:
         return replace(state, other=()), flag, reason, normal
-    row = (*(each for each in state.other if abs(each / speed - 1) < REGIME_AGREES), speed)
-    if len(row) < REGIME_DIVES:
+    row = (*(each for each in state.other if abs(each / speed - 1) < AGREE), speed)
+    if len(row) < ENOUGH:
         return replace(state, other=row), None, NEW_FASTER if faster else NEW_SLOWER, normal
     at = setting(dive.features)
     state = replace(state, normal=renewed(state.normal, row, at), other=(), slow=0.0, doubted=0)
@@ -297,7 +306,7 @@ def retrimmed(before: Trim, now: Trim) -> bool:
     >>> retrimmed((), (-0.45, 0.45, None, None))
     False
     """
-    pairs = zip(before, now, TRIM_CHANGE, strict=False)
+    pairs = zip(before, now, RETRIMMED, strict=False)
     return any(a is not None and b is not None and abs(a - b) > least for a, b, least in pairs)
 
 
@@ -306,7 +315,7 @@ def _misfits(state: SpeedState, info: JointInfo) -> tuple[Misfit, ...]:
     rest = info.seen.rest
     if rest is None or info.across is None:
         return state.misfits
-    return (*state.misfits, misfit(rest, info.seen.heading, info.across))[-MISFITS_KEPT:]
+    return (*state.misfits, misfit(rest, info.seen.heading, info.across))[-KEPT:]
 
 
 def _wrong(state: SpeedState, info: JointInfo, params: SpeedParams) -> tuple[Flag | None, str]:
@@ -391,14 +400,14 @@ def _small_losses(
     """Flag 1 where a loss too small for one dive has gone on for several; the state with the sum of it."""
     if not normal.dives or (info.seen.is_free and not info.believes):
         return state, Flag.NORMAL, ""
-    bound = cusum_bound(SLACK_DEPARTURES, DIVES_A_MONTH / params.joint.alarms_per_month)
+    bound = cusum_bound(SLACK, DIVES_A_MONTH / params.joint.alarms_per_month)
     found = info.estimate
     # a dive that hardly tells the speed adds little, and no dive alone is several
     departure = (1 - found.speed / normal.usual) / max(DEPARTURE, found.own_sigma / normal.usual)
     part = min((info.seen.end - info.seen.start) / USUAL_DIVE, 1.0)
-    departure = min(departure, bound / 2 + SLACK_DEPARTURES)
-    total = min(cusum(state.slow, part * departure, part * SLACK_DEPARTURES), bound + SLACK_DEPARTURES)
-    if departure < SLACK_DEPARTURES / 2:
+    departure = min(departure, bound / 2 + SLACK)
+    total = min(cusum(state.slow, part * departure, part * SLACK), bound + SLACK)
+    if departure < SLACK / 2:
         total /= 2  # it flies as usual: what was slow is over soon
     state = replace(state, slow=total)
     if total > bound:
@@ -420,15 +429,15 @@ def _how_slow(
 def _rolls(state: SpeedState, dive: Dive) -> bool:
     """Whether the roll of a dive differs much from the usual one."""
     roll = dive.features.roll_mean
-    if roll is None or dive.n_samples < USUAL_ROLLS or len(state.rolls) < USUAL_ROLLS:
+    if roll is None or dive.n_samples < ROLLS or len(state.rolls) < ROLLS:
         return False
-    return abs(roll - median(state.rolls)) > ROLL_STEP
+    return abs(roll - median(state.rolls)) > ROLLED
 
 
 def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: SpeedParams) -> SpeedState:
     """The state with what a normal dive teaches."""
     roll = dive.features.roll_mean
-    if roll is not None and len(state.rolls) < 3 * USUAL_ROLLS:
+    if roll is not None and len(state.rolls) < 3 * ROLLS:
         state = replace(state, rolls=(*state.rolls, roll))
     own = info.seen.own_speed()
     if own is not None and own[1] < (2 if info.seen.is_free else 1) * OWN_SURE * own[0]:

@@ -10,21 +10,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gliderwatch.model import Array, readonly
-from gliderwatch.sea.constants import (
-    EVEN_INTERVALS,
-    FAR_INNOVATION,
-    FIRST_SCALE,
-    FIRST_SCALE_DIVES,
-    INNOVATION_TAIL,
-    RECENT_INTERVALS,
-    SCALE_BOUNDS,
-    SCALE_MEMORY,
-    SCORE_FORGETS,
-    SCORE_MEMORY,
-    SCORED_DIVES,
-    SEA_UNKNOWN_AFTER,
-    TIDES_BETTER_BY,
-)
 from gliderwatch.sea.tides import HOUR, Constituent, aliasing
 
 # ----------------------------------------
@@ -170,6 +155,15 @@ def learn_belief(
 # end elsewhere on another run, and what is uncertain in the parameters is part of the forecast's covariance.
 # The grid holds ratios; the scale of all variances is learnt for each set from its own innovations.
 
+MEMORY = 100
+"""Dives after which what a set has foretold counts for a third: seas change along the way."""
+TAIL = 6.0
+"""Degrees of freedom of Student's t by which innovations are judged: one wild dive must not decide."""
+SCALE_MEMORY, FEW = 40, 6
+"""Dives over which the scale is learnt, and how many its first guess counts for."""
+FAR, SCALE, FIRST = 9.0, (0.1, 9.0), 1.5
+"""An innovation's normalised square counts as this at most; bounds of the scale, and its first guess:
+little is known at first, and forecasts should say so."""
 STRENGTH = {
     Constituent.M2: 1.0,
     Constituent.S2: 0.46,
@@ -234,9 +228,7 @@ def grid(
 def init_bank(t: float, params: Parameters) -> Bank:
     """Before any dive, at a time (s)."""
     belief, sets = init_belief(t, params), len(params.sigma)
-    return Bank(
-        t, belief.mean, _packed(belief.cov), readonly(np.zeros(sets)), readonly(np.full(sets, FIRST_SCALE))
-    )
+    return Bank(t, belief.mean, _packed(belief.cov), readonly(np.zeros(sets)), readonly(np.full(sets, FIRST)))
 
 
 def belief(bank: Bank) -> Belief:
@@ -264,12 +256,10 @@ def learn_bank(
     after, each = learn_belief(belief(bank), start, end, current, sigma, params)
     variance = (each.var + sigma**2) * bank.scale
     square = np.sum((current - each.mean) ** 2, axis=1) / variance
-    likelihood = -np.log(variance) - (INNOVATION_TAIL + 2) / 2 * np.log1p(square / INNOVATION_TAIL)
-    surprise = np.minimum(square / 2, FAR_INNOVATION) - 1
-    scale = np.clip(
-        bank.scale * (1 + surprise / min(dives + 1 + FIRST_SCALE_DIVES, SCALE_MEMORY)), *SCALE_BOUNDS
-    )
-    fit = bank.fit * (1 - 1 / SCORE_MEMORY) + likelihood
+    likelihood = -np.log(variance) - (TAIL + 2) / 2 * np.log1p(square / TAIL)
+    surprise = np.minimum(square / 2, FAR) - 1
+    scale = np.clip(bank.scale * (1 + surprise / min(dives + 1 + FEW, SCALE_MEMORY)), *SCALE)
+    fit = bank.fit * (1 - 1 / MEMORY) + likelihood
     learnt = Bank(end, after.mean, _packed(after.cov), readonly(fit), readonly(scale))
     return learnt, _mixed(bank, each.mean, each.var * bank.scale)
 
@@ -304,6 +294,16 @@ def _packed(cov: Array) -> Array:
 TIDES = (Constituent.M2, Constituent.S2, Constituent.K1, Constituent.O1)
 PLAIN_GRID = grid((0.015, 0.04, 0.12), [h * HOUR for h in (10, 30, 100, 1000)], ((0.0, 0.0),), ())
 TIDAL_GRID = grid((0.02, 0.08), [h * HOUR for h in (30, 300)], ((0.05, 0.1), (0.2, 0.1)), TIDES)
+APART = 3 * 86400.0
+"""Seconds without a current after which the sea is taken for unknown."""
+FORGET = 1 / 100
+"""Part of the score that is forgotten with each dive."""
+ENOUGH, MARGIN = 6.0, 2.0
+"""Dives that a score needs, and by how many standard errors tides have to be better than persistence."""
+RECENT = 8
+"""Dives whose intervals say how often the glider surfaces."""
+EVEN = 0.1
+"""Intervals that differ by more than this part are uneven: then no tide hides behind them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -321,8 +321,8 @@ class Score:
     @property
     def tides_won(self) -> bool:
         """Whether tides have clearly beaten persistence, and the residual alone as well."""
-        enough = self.dives >= SCORED_DIVES and self.tides < self.residual
-        return enough and self.gain > TIDES_BETTER_BY * math.sqrt(self.gain_squared)
+        enough = self.dives >= ENOUGH and self.tides < self.residual
+        return enough and self.gain > MARGIN * math.sqrt(self.gain_squared)
 
 
 @dataclass(frozen=True, slots=True)
@@ -371,7 +371,7 @@ def learn(state: Currents, start: float, end: float, current: Array, sigma: floa
         math.isfinite(start) and math.isfinite(end) and np.isfinite(current).all() and 0 < sigma < math.inf
     ):
         raise ValueError(f"no current to learn from: {current} with error {sigma} from {start} to {end}")
-    if state.end is not None and start - state.end > SEA_UNKNOWN_AFTER:
+    if state.end is not None and start - state.end > APART:
         state = Currents()
     begin = start if state.end is None else max(start, state.end)
     if end <= begin:
@@ -391,8 +391,8 @@ def learn(state: Currents, start: float, end: float, current: Array, sigma: floa
         end=end,
         dives=dives + 1,
         filters=Filters(plain, tidal, readonly(current)),
-        intervals=(*state.intervals, *between)[-RECENT_INTERVALS:],
-        durations=(*state.durations, end - begin)[-RECENT_INTERVALS:],
+        intervals=(*state.intervals, *between)[-RECENT:],
+        durations=(*state.durations, end - begin)[-RECENT:],
     )
 
 
@@ -411,9 +411,7 @@ def choice(state: Currents) -> str:
     score = state.score
     if score.tides_won:
         return "tides"
-    return (
-        "residual" if score.dives >= SCORED_DIVES and score.residual <= score.persistence else "persistence"
-    )
+    return "residual" if score.dives >= ENOUGH and score.residual <= score.persistence else "persistence"
 
 
 def forecasts(state: Currents, start: float, end: float) -> dict[str, Mixture] | None:
@@ -422,7 +420,7 @@ def forecasts(state: Currents, start: float, end: float) -> dict[str, Mixture] |
     The error of persistence is that of the residual's forecast, and how far the two are apart.
     """
     held = state.filters
-    if held is None or state.end is None or start - state.end > SEA_UNKNOWN_AFTER:
+    if held is None or state.end is None or start - state.end > APART:
         return None
     begin = max(start, state.end)
     if end <= begin:
@@ -436,17 +434,17 @@ def forecasts(state: Currents, start: float, end: float) -> dict[str, Mixture] |
 
 def notes(state: Currents) -> tuple[str, ...]:
     """What the glider's surfacing interval hides of the tides, once it is known to be even."""
-    if len(state.intervals) < RECENT_INTERVALS:
+    if len(state.intervals) < RECENT:
         return ()
     usual = float(np.median(state.intervals))
-    if np.abs(np.array(state.intervals) / usual - 1).max() > EVEN_INTERVALS:
+    if np.abs(np.array(state.intervals) / usual - 1).max() > EVEN:
         return ()
     return aliasing(TIDES, usual, float(np.median(state.durations)))
 
 
 def _scored(score: Score, persistence: float, residual: float, tides: float) -> Score:
     """The score after one more dive's squared errors (m2/s2)."""
-    kept, gain = 1 - SCORE_FORGETS, persistence - tides
+    kept, gain = 1 - FORGET, persistence - tides
     return Score(
         dives=kept * score.dives + 1,
         persistence=kept * score.persistence + persistence,

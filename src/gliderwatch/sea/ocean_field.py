@@ -11,8 +11,13 @@ from datetime import UTC, datetime
 import numpy as np
 
 from gliderwatch.model import Array, Fix, readonly
-from gliderwatch.sea.constants import POINTS_ALONG, STALE_FIELD, WET
 
+STALE = 24 * 3600.0
+"""Seconds beyond the last time of a field, or between two times of it, after which it is not believed."""
+WET = 0.5
+"""Part of a place's weight that must be water: nearer to land the field is not believed."""
+POINTS = 8
+"""Places along the way of a dive at which a field is read."""
 Flow = tuple[float, float]
 
 
@@ -32,7 +37,7 @@ class Field:
     u: Array
     v: Array
     source: str
-    stale: float = STALE_FIELD
+    stale: float = STALE
 
     def __post_init__(self) -> None:
         shape = (len(self.t), max(len(self.depth), 1), len(self.lat), len(self.lon))
@@ -68,8 +73,8 @@ class Field:
         """Mean current (m/s) on the straight way between two fixes of a dive to ``depth`` (m), or why not."""
         found: list[Flow] = []
         east = (end.lon - start.lon + 180.0) % 360.0 - 180.0
-        for k in range(POINTS_ALONG):
-            part = (k + 0.5) / POINTS_ALONG
+        for k in range(POINTS):
+            part = (k + 0.5) / POINTS
             t = start.t + part * (end.t - start.t)
             each = self.at(t, start.lat + part * (end.lat - start.lat), start.lon + part * east, depth)
             if isinstance(each, str):

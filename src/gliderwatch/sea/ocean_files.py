@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from gliderwatch.errors import GliderwatchError, Quarantine, Retry
 from gliderwatch.model import Array, readonly
-from gliderwatch.sea.constants import STALE_FIELD
-from gliderwatch.sea.ocean_field import Field
+from gliderwatch.sea.ocean_field import STALE, Field
 
 STANDARD = (
     ("eastward_sea_water_velocity", "northward_sea_water_velocity"),
@@ -64,7 +63,7 @@ class _Piece:
     v: Array
 
 
-def read_field(patterns: Sequence[str], area: Box | None = None, stale: float = STALE_FIELD) -> Field:
+def read_field(patterns: Sequence[str], area: Box | None = None, stale: float = STALE) -> Field:
     """The field of all files that match any of the shell ``patterns`` (``**``: folders of any depth).
 
     Files of several times are joined; of a time that several hold, the file whose name sorts last counts (the

@@ -6,9 +6,13 @@ import math
 from collections.abc import Sequence
 from enum import StrEnum
 
-from gliderwatch.sea.constants import FAINT_TIDE, NEAR_QUADRATURE, SEEN_OFTEN
-
 HOUR = 3600.0
+NEAR = 0.05
+"""Half periods by which an interval may miss a whole number of them and still show one quadrature only."""
+OFTEN = 0.42
+"""Periods between surfacings at which a tide is well seen: clearly less than half a period."""
+FAINT = 0.2
+"""Part of a tide that is left in the mean over a dive, below which it is lost in the noise."""
 
 
 class Constituent(StrEnum):
@@ -72,7 +76,7 @@ def aliasing(constituents: Sequence[Constituent], interval: float, duration: flo
     for kind in dict.fromkeys(kind for kind in kinds.values() if kind):
         some = [each for each in constituents if kinds[each] == kind]
         names = " and ".join(", ".join(some).rsplit(", ", 1))
-        often = SEEN_OFTEN * min(each.period for each in some) / HOUR
+        often = OFTEN * min(each.period for each in some) / HOUR
         notes.append(
             f"{every} {kind.format(names)}: to tell it, surface every {often:.1f} h or more often"
             + ("" if kind is _AWAY else ", or at uneven intervals")
@@ -87,9 +91,9 @@ _SLOW = "makes the {} tide look like a slower current"
 
 def _hidden(each: Constituent, interval: float, duration: float) -> str:
     """How an interval (s) hides a tide; empty: not at all."""
-    if abs(smoothing(each.omega, duration)) < FAINT_TIDE:
+    if abs(smoothing(each.omega, duration)) < FAINT:
         return _AWAY
     halves = interval / (each.period / 2)
-    if round(halves) and abs(halves - round(halves)) < NEAR_QUADRATURE:
+    if round(halves) and abs(halves - round(halves)) < NEAR:
         return _HALF
     return _SLOW if halves > 1 else ""

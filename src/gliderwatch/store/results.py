@@ -10,7 +10,16 @@ from gliderwatch.incidents.constants import GONE
 from gliderwatch.incidents.irregularities import PLACES, Coming, found
 from gliderwatch.incidents.notices import Irregularity, Unjudged
 from gliderwatch.incidents.overdue import Sign
-from gliderwatch.model import Alert, Assessment, Call, Fix, Hindrance, Incident, NextSurfacing, Unusable
+from gliderwatch.model import (
+    Alert,
+    Assessment,
+    Call,
+    Fix,
+    Hindrance,
+    Incident,
+    NextSurfacing,
+    Unusable,
+)
 from gliderwatch.store import codec, segments
 from gliderwatch.store.codec import values
 

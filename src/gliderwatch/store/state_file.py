@@ -9,7 +9,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from gliderwatch.incidents.notifications import NotificationState
-from gliderwatch.model import Alert, Assessment, Incident, NextSurfacing, SegmentId, Unusable
+from gliderwatch.model import (
+    Alert,
+    Assessment,
+    Incident,
+    NextSurfacing,
+    SegmentId,
+    Unusable,
+)
 from gliderwatch.navigation.clock import SAME_OPENING, ClockStep
 from gliderwatch.pipeline import Outcome
 from gliderwatch.store import codec, outbox, retention, segments
