@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gliderwatch.estimation.adaptive import Learner, step, warm_up
-from gliderwatch.estimation.dive_measurement import NEW_AFTER
+from gliderwatch.estimation.constants import NEW_AFTER
 from gliderwatch.model import Assessment, Dive, DiveFeatures, Fix
 from gliderwatch.navigation.dives import Navigation, extend
 from gliderwatch.params import GliderParams, LearnerParams

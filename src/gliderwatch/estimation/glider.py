@@ -9,7 +9,7 @@ import numpy as np
 
 from gliderwatch.estimation import adaptive
 from gliderwatch.estimation.adaptive import Learner
-from gliderwatch.estimation.dive_measurement import PROVISIONAL, REPORTED
+from gliderwatch.estimation.constants import APART, PROVISIONAL, REPORTED
 from gliderwatch.estimation.healthy_baseline import Baseline, learn, told
 from gliderwatch.estimation.kalman import JointEstimate, JointInfo, JointParams, expected_flow
 from gliderwatch.estimation.speed_range import RangeParams
@@ -26,9 +26,6 @@ from gliderwatch.sea.ocean_field import Field
 
 # ----------------------------------------
 # What the joint estimator says of a dive, as an assessment.
-
-APART = 16.0
-"""Squared misfit of flow and reference, in standard errors, that is no chance."""
 
 
 @dataclass(frozen=True, slots=True)
