@@ -135,11 +135,11 @@ class TestOpening:
         assert after.opened_at < before.opened_at, "today's estimator sees it sooner"
         assert len(made) == 31
 
-    @pytest.mark.parametrize("schema, apart", [(4, 0.03), (7, 1e-6)])
-    def test_a_state_file_that_was_cut_is_gone_on_from(self, path, schema, apart):
+    @pytest.mark.parametrize("schema", [4, 7])
+    def test_a_state_file_that_was_cut_is_gone_on_from(self, path, schema):
         """`keep_days` has removed what was before its first checkpoint: that is read, not made again. What
         comes next gives dives, flags and the incident that the code that wrote it made of the same segments;
-        speeds of schema 4 are those of another estimator."""
+        speeds are those of another estimator."""
         path.parent.mkdir()
         path.write_bytes(gzip.decompress((GOLDEN / f"schema-{schema}.sqlite.gz").read_bytes()))
         with sqlite3.connect(path) as db:
@@ -161,7 +161,7 @@ class TestOpening:
             flown = [(a["t_dive"], a["flag"]) for a in then["assessments"]]
             assert [(a["t_dive"], a["flag"]) for a in now["assessments"]] == flown
             pairs = zip(now["assessments"], then["assessments"], strict=True)
-            assert all(abs(a["speed"] - b["speed"]) < apart for a, b in pairs if b["speed"] is not None)
+            assert all(abs(a["speed"] - b["speed"]) < 0.03 for a, b in pairs if b["speed"] is not None)
             incident = [(i["id"], i["kind"], i["dives"]) for i in then["incidents"]]
             assert [(i["id"], i["kind"], i["dives"]) for i in now["incidents"]] == incident
             assert len(then["alerts"]) == 1 and then["incidents"][0]["dives"] > 1
