@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import hypot, sqrt
 
 import numpy as np
@@ -44,6 +45,7 @@ class Estimate:
     currents: Currents = Currents()
 
 
+@lru_cache(maxsize=64)
 def speed_params(params: GliderParams) -> SpeedParams:
     """The parameters of the joint estimator and of its tests among those of a glider."""
     return SpeedParams(

@@ -196,6 +196,8 @@ def _usual(values: list[float], same: list[bool], quantity: Quantity) -> tuple[f
         windows = [first if len(first) >= BASELINE_LEAST else list(compress(known, alike))]
     if len(windows[-1]) < BASELINE_LEAST:
         return None
+    if len(known) <= min(BASELINE_FIRST, BASELINE_RECENT):
+        del windows[1:]  # the first are the latest too
     ranges = [_range(values, quantity) for values in windows]
     return min(low for low, _, _ in ranges), ranges[-1][1], max(high for _, _, high in ranges)
 

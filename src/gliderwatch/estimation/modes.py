@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import lru_cache
 from math import log, pi, sqrt
 
 import numpy as np
@@ -90,11 +91,18 @@ MODES = (
 def switched(modes: tuple[Mode, ...], before: Mapping[Cause, float]) -> tuple[Mode, ...]:
     """The modes with the chances that they have after a dive which was explained so ``before``: what is
     wrong stays."""
-    rare = {
-        mode.cause: max(mode.chance, STAYS * before.get(mode.cause, 0.0))
+    rare = (
+        (mode.cause, max(mode.chance, STAYS * before.get(mode.cause, 0.0)))
         for mode in modes
         if mode.cause.is_error
-    }
+    )
+    return _with_chances(modes, tuple(rare))
+
+
+@lru_cache(maxsize=64)  # on nearly all dives nothing was wrong before
+def _with_chances(modes: tuple[Mode, ...], chances: tuple[tuple[Cause, float], ...]) -> tuple[Mode, ...]:
+    """The modes where these have other chances, and the rest what is left, in proportion."""
+    rare = dict(chances)
     left = 1 - sum(rare.values())
     rest = sum(mode.chance for mode in modes if not mode.cause.is_error)
     return tuple(
