@@ -240,9 +240,7 @@ def main() -> None:
     parser.add_argument("--days", type=float, default=30.0, help="of healthy gliders")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--direct", action="store_true", help="write no checkpoints: half of the time")
-    parser.add_argument(
-        "--bare", action="store_true", help="incidents alone, no messages: a quarter of it"
-    )
+    parser.add_argument("--bare", action="store_true", help="incidents alone, no messages: a quarter of it")
     parser.add_argument("--told", action="store_true", help="every message that should not be")
     parser.add_argument("--json", type=Path, help="all measures and all that was told")
     parser.add_argument("--kept", type=Path, default=Path(__file__).parents[1] / "build" / "seas")
