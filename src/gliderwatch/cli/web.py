@@ -29,7 +29,8 @@ def web(config_path: Path, link: str | None, recipient: str | None) -> None:
     try:
         import uvicorn
 
-        from gliderwatch.web import app, links
+        from gliderwatch.delivery import links
+        from gliderwatch.web import app
     except ImportError as error:
         raise GliderwatchError(f"{error.name} is not installed: pip install 'gliderwatch[web]'") from None
     if link is not None:
