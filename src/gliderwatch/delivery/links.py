@@ -116,7 +116,7 @@ def linked(channels: dict[str, Sender], public: str, state: Path) -> dict[str, S
         import itsdangerous  # noqa: F401
     except ImportError:
         raise GliderwatchError(
-            "web.public_url needs itsdangerous, which is not installed: pip install 'gliderwatch[web]'"
+            "web.public_url needs itsdangerous, which is not installed: docs/install.md says how"
         ) from None
     key = key_of(state)
     return {name: Linked(sender, public.rstrip("/"), key, name) for name, sender in channels.items()}
