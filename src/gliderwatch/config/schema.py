@@ -29,7 +29,7 @@ from gliderwatch.fleet.constants import APART
 from gliderwatch.incidents import send_schedule
 from gliderwatch.model import Severity
 from gliderwatch.params import AnomalyRule, Attention, FalseAlarmRule, GliderParams, LearnerParams, RuleParams
-from gliderwatch.sea.ocean_field import STALE
+from gliderwatch.sea.constants import STALE
 
 # ----------------------------------------
 # The sections of the settings that are of gliders, as frozen pydantic models.
