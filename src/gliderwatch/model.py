@@ -368,6 +368,7 @@ class Kind(StrEnum):
     SURFACING = "surfacing"
     ABORT = "abort"
     CALL = "call"
+    NEIGHBOURS = "neighbours"
     OPERATOR = "operator"
 
 

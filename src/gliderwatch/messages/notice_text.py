@@ -10,7 +10,14 @@ from collections.abc import Callable
 from typing import Any
 
 from gliderwatch.incidents import notices as n
-from gliderwatch.messages import call_text, incident_text, irregularity_text, overdue_text, unjudged_text
+from gliderwatch.messages import (
+    call_text,
+    incident_text,
+    irregularity_text,
+    neighbours_text,
+    overdue_text,
+    unjudged_text,
+)
 from gliderwatch.messages.formatting import clean, utc
 from gliderwatch.messages.template import Page, Text
 from gliderwatch.model import Alert, Kind, Severity
@@ -31,6 +38,7 @@ _WRITERS: dict[type, Callable[[str, Any], Text]] = {
     n.Resumed: call_text.resumed,
     n.CalledWithoutFile: call_text.without_file,
     n.SendsAgain: call_text.sends_again,
+    n.DiffersFromNeighbours: neighbours_text.differs,
     n.Irregularity: lambda _, found: _of_operator(*irregularity_text.words(found), found.t),
 }
 """How each content of a notice reads, of which glider."""
