@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from gliderwatch.fleet.advice import Advice
 from gliderwatch.fleet.cross_check import Hypothesis
+from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.model import (
     Assessment,
     Call,
@@ -67,12 +68,13 @@ class Corrected:
 @dataclass(frozen=True, slots=True)
 class Surfaced:
     """A surfacing; ``previous`` is the time of the one before (s), ``expected`` the next; ``advice`` where to
-    look next for a field, by its name."""
+    look next for a field, by its name, ``layers`` how deep to fly to keep on them."""
 
     dive: Assessment
     previous: float | None
     expected: NextSurfacing | None
     advice: tuple[tuple[str, Advice], ...] = ()
+    layers: LayerAdvice | None = None
 
 
 @dataclass(frozen=True, slots=True)

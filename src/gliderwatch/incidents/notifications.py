@@ -18,6 +18,7 @@ from gliderwatch.incidents.neighbours import Comparison
 from gliderwatch.incidents.notices import Cleared, Corrected, NewRegime, Notice, Opened, StillOpen, Surfaced
 from gliderwatch.incidents.overdue import Silence
 from gliderwatch.incidents.unjudged import Unknown
+from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.model import Assessment, Incident, Kind, NextSurfacing, Severity
 
 # ----------------------------------------
@@ -88,12 +89,13 @@ def due_notifications(
     notices: bool,
     acks: Acks = NO_ACKS,
     advice: tuple[tuple[str, Advice], ...] = (),
+    layers: LayerAdvice | None = None,
 ) -> tuple[NotificationState, list[Notice]]:
     """The messages to send now, and what will have been said then.
 
     `notices`: whether anyone wants a notice of each surfacing. An incident that somebody has acknowledged
     (`acks`) is not brought to mind, unless it has grown worse since. `advice`: where to look next, by the
-    name of the field.
+    name of the field; `layers`: how deep to fly next.
     """
     latest = known.last_surfacing(float("inf"))
     if latest is None:
@@ -124,7 +126,7 @@ def due_notifications(
         expected = known.expected(float("inf"))
         if expected is not None and expected.after < latest.t_surface:
             expected = None  # of an earlier surfacing: the last dive cannot be used
-        content = Surfaced(latest, previous, expected, advice)
+        content = Surfaced(latest, previous, expected, advice, layers)
         info = Severity.INFO
         alerts.append(
             Notice(identity, "", latest.glider, latest.t_surface, Kind.SURFACING, info, info, content)
