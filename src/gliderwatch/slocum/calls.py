@@ -15,6 +15,7 @@ from typing import BinaryIO
 from gliderwatch.errors import Quarantine
 from gliderwatch.model import Aborts, Call, Fix, Happened, Happening
 from gliderwatch.slocum import folders, logs
+from gliderwatch.slocum.call_readings import with_readings
 from gliderwatch.slocum.header import open_regular
 from gliderwatch.slocum.logs import LONGEST_LINE, Event, parse_line
 
@@ -111,7 +112,8 @@ def after(dialog: Dialog, event: Event) -> Dialog:
     dialog = _happening(_aborts(dialog, event), event)
     match event:
         case logs.Clock():
-            return _timed(dialog, event.t)
+            timed = _timed(dialog, event.t)
+            return timed if timed is dialog else replace(timed, call=with_readings(timed.call, event, event.t))
         case logs.Vehicle():
             return _named(dialog, event.name)
         case logs.PilotThere():
@@ -136,7 +138,7 @@ def _told(call: Call, event: Event, t: float) -> Call:
             call = replace(call, waypoint=(event.lat, event.lon))
         case logs.Transfer():
             call = _transferred(call, event)
-    return call
+    return with_readings(call, event, t) if t else call
 
 
 def _timed(dialog: Dialog, t: float) -> Dialog:

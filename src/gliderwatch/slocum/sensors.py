@@ -39,6 +39,10 @@ _UNITS = {
     "%": ("1", 0.01),
     "watt": ("W", 1.0),
     "inHg": ("Pa", 3386.389),
+    "degC": ("degC", 1.0),
+    "sec": ("s", 1.0),
+    "bytes": ("B", 1.0),
+    "Mbytes": ("B", 1e6),
     "nodim": ("1", 1.0),
     "enum": ("1", 1.0),
 }
@@ -122,6 +126,16 @@ QUANTITIES = (
     _q("leak_voltage", "m_leakdetect_voltage", "volts", 0, 5, "leak detector, aft"),
     _q("leak_voltage_forward", "m_leakdetect_voltage_forward", "volts", 0, 5, "leak detector, forward"),
     _q("leak_voltage_science", "m_leakdetect_voltage_science", "volts", 0, 5, "leak detector, science bay"),
+    _q("digifin_leak", "m_digifin_leakdetect_reading", "nodim", 1, 1024, "leak reading of the digifin"),
+    _q("vehicle_temperature", "m_veh_temp m_vehicle_temp", "degC", -5, 60, "temperature inside the hull"),
+    _q("battery_position_commanded", "c_battpos", "in", -0.2, 0.2, "commanded position of the pitch battery"),
+    _q("fin_commanded", "c_fin", "rad", -1.5, 1.5, "commanded angle of the fin"),
+    _q("ballast_commanded", "c_ballast_pumped", "cc", -2e-3, 2e-3, "commanded volume of a shallow pump"),
+    _q("oil_volume_commanded", "c_de_oil_vol", "cc", -2e-3, 2e-3, "commanded volume of a deep pump"),
+    _q("altitude_target", "x_current_target_altitude", "m", 0.1, 2000, "height at which it turns"),
+    _q("mission_time", "m_present_secs_into_mission", "sec", 0, 1e8, "time since the mission began"),
+    _q("heap_free", "m_free_heap", "bytes", 1, 1e9, "free memory of the flight computer"),
+    _q("disk_free", "m_disk_free", "Mbytes", 1, 1e12, "free disk of the flight computer"),
 )
 SENSORS = (TIME, *PRESSURES, *(sensor for quantity in QUANTITIES for sensor in quantity.sensors))
 """All Slocum sensors that are read where a file has them."""
