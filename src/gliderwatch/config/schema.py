@@ -25,6 +25,7 @@ from gliderwatch.config.fields import (
     Url,
     Zone,
 )
+from gliderwatch.config.health import Health
 from gliderwatch.incidents import send_schedule
 from gliderwatch.model import Severity
 from gliderwatch.params import AnomalyRule, Attention, FalseAlarmRule, GliderParams, LearnerParams, RuleParams
@@ -190,6 +191,7 @@ class Settings(Preset):
 
     preset: str | None = Field(default=None, description="Name of a preset; keys given here win over it.")
     rules: Rules = Field(default=Rules(), description="When to alert.")
+    health: Health = Field(default=Health(), description="Rules of health.")
 
     def params(self) -> GliderParams:
         """As the values that the pipeline takes."""
@@ -222,6 +224,11 @@ class Glider(Settings):
         default=None,
         description="Nothing is told of it until then; it is assessed all the same. A date (`2026-12-01`: "
         "from 00:00 UTC on it is told of again) or a date and time in UTC (`2026-12-01 14:30`).",
+    )
+    recovery: Moment | None = Field(
+        default=None,
+        description="When it is planned to be taken out of the water; the end of its battery is held against "
+        "that. A date (`2026-12-01`) or a date and time in UTC.",
     )
     recovered: Switch = Field(
         default=False, description="It is out of the water: nothing is told of it, its silence least of all."

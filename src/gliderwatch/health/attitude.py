@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gliderwatch.health.constants import BEYOND, MOVED, ROLL_STEP, USUAL_FILES
+from gliderwatch.health.constants import BEYOND, MOVED, USUAL_FILES
 from gliderwatch.health.readings import COMMANDED, History
 from gliderwatch.health.rule import Finding, Limit, Limits, Rule, found, loudest, run, spread
 from gliderwatch.model import Severity
+
+_DEGREE = float(np.radians(1))
 
 
 def _altitude(history: History, limits: Limits) -> Finding | None:
@@ -96,13 +98,10 @@ ROLL = Rule(
     ("roll_in_flight",),
     _roll,
     (
-        Limit(
-            "step", float(np.degrees(ROLL_STEP)), "degree", 1, 180,
-            "Two dives in a row so far off the usual roll are a warning.", float(np.radians(1)),
-        ),
+        Limit("step", 15, "degree", 1, 180, "Two dives in a row so far off are a warning.", _DEGREE),
     ),
     "A step of the roll against the mission's own: a lost wing, a load.",
-)  # fmt: skip
+)
 MOTORS = Rule(
     "motors",
     tuple(f"{name}_error" for name in COMMANDED),

@@ -39,8 +39,6 @@ ROBUST = 1.4826
 BEYOND = 6.0
 """Robust standard deviations beyond which a value is none of the usual ones (measured: none in the five
 missions beyond 5, but for roll)."""
-ROLL_STEP = 0.26
-"""Least step of the roll (rad): 15 degrees, from peers' alert lists."""
 MOVED = {"battery_position": 0.005, "fin": 0.1, "ballast": 30e-6, "oil_volume": 30e-6}
 """Least difference of commanded and measured (m, rad, m3, m3) that is spoken of: some times the deadband of
 each motor."""
