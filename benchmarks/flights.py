@@ -18,10 +18,9 @@ from gliderwatch.estimation.verdict import SpeedParams, SpeedState, Verdict, ste
 from gliderwatch.model import Current, Dive, Segment, readonly
 from gliderwatch.navigation.dives import Navigation, extend
 from gliderwatch.simulate.delivery import write_mission
-from gliderwatch.simulate.flight import Airframe
+from gliderwatch.simulate.flight import Airframe, Point
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.ocean import Constituent, Ellipse, Front, Sea
-from gliderwatch.simulate.onboard import Point
 from gliderwatch.simulate.scenario import DiveTruth, Fault, FaultKind, Scenario
 from gliderwatch.slocum import folders
 from gliderwatch.slocum.decode import decode

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gliderwatch.simulate.onboard import Point, displacement
+from gliderwatch.simulate.flight import Point, displacement
 from gliderwatch.simulate.scenario import Mission, Scenario
 from gliderwatch.simulate.telemetry import CADENCE
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from acceptance.support import Daemon, Mail, Site, command, lines, mail_server, until
 from clocks import WEEKS, files_with_clock_set
 from gliderwatch.simulate.delivery import FileForm, Names, arrivals
+from gliderwatch.simulate.flight import Point
 from gliderwatch.simulate.glider import simulate
-from gliderwatch.simulate.onboard import Point
 from gliderwatch.simulate.scenario import Mission, Scenario
 
 DAY = 86400.0

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from gliderwatch.simulate.delivery import write_mission
+from gliderwatch.simulate.flight import Point, displacement, nmea
 from gliderwatch.simulate.glider import simulate
-from gliderwatch.simulate.onboard import Point, displacement, nmea
 from gliderwatch.simulate.scenario import Scenario
 from gliderwatch.slocum.decode import decode
 from missions import feed

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.model import Assessment, Incident
 from gliderwatch.params import GliderParams
-from gliderwatch.service import transaction, triage
-from gliderwatch.service.triage import Job
+from gliderwatch.service import intake, transaction
+from gliderwatch.service.backlog import Job
 from gliderwatch.simulate.delivery import arrivals as sent
 from gliderwatch.simulate.delivery import write_cache
 from gliderwatch.simulate.glider import simulate
@@ -44,13 +44,13 @@ class Shore:
         """One file is there, or has changed."""
         path = self.inbox / name
         path.write_bytes(data)
-        job = triage.triage(path, self.store, [self.caches], lambda _: True)
+        job = intake.triage(path, self.store, [self.caches], lambda _: True)
         now = float(next(self._clock))
         if isinstance(job, Job):
             try:
                 segment = decode(path, [self.caches])
             except GliderwatchError as error:
-                self.store.note(triage.failed(job.file, error), now)
+                self.store.note(intake.failed(job.file, error), now)
             else:
                 transaction.process_file(self.store, job.file, segment, GliderParams(), None, now)
         elif job is not None:

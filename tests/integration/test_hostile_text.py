@@ -21,7 +21,7 @@ from rich.console import Console
 import dinkum
 from gliderwatch.cli import tables
 from gliderwatch.cli import tables as frames
-from gliderwatch.cli.status import Overview, as_json
+from gliderwatch.cli.status import Overview, status_as_json
 from gliderwatch.config import Problem
 from gliderwatch.delivery.channels import Channel
 from gliderwatch.delivery.mail import Envelope, compose
@@ -176,7 +176,7 @@ def test_status_is_harmless() -> None:
     tables.status(view, console)
     assert is_harmless(stream.getvalue())
     assert "[bold]x[/]" in stream.getvalue()
-    (told,) = json.loads(json.dumps(as_json(view)))["quarantined"]
+    (told,) = json.loads(json.dumps(status_as_json(view)))["quarantined"]
     assert told["path"] == PATH
 
 

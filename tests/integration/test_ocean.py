@@ -10,7 +10,7 @@ from gliderwatch.config import load
 from gliderwatch.errors import GliderwatchError, Quarantine, Retry
 from gliderwatch.sea.ocean_field import Field
 from gliderwatch.sea.ocean_files import Box, read_field
-from gliderwatch.service.ocean_cache import OceanCache
+from gliderwatch.service.runtime import OceanCache
 
 HOUR = 3600.0
 T0 = 1_714_521_600.0  # 2024-05-01

@@ -246,7 +246,7 @@ class TestSignsOfLife:
 
     def test_the_header_of_a_file_that_cannot_be_read(self, fleet) -> None:
         """What `arrivals.judge` makes of a file tells when it was opened."""
-        from gliderwatch.service.triage import triage
+        from gliderwatch.service.intake import triage
 
         path, segment = fleet[1][0]
         assert read_header(path).id == segment.id

@@ -10,10 +10,9 @@ import pytest
 
 import dinkum
 from gliderwatch.errors import Quarantine
-from gliderwatch.slocum.caches import checksum, list_text
+from gliderwatch.slocum.caches import SensorLists, checksum, list_text, lists_folder
 from gliderwatch.slocum.cycles import parse_sensor_list
 from gliderwatch.slocum.header import parse_header, plain, read_header
-from gliderwatch.slocum.sensor_lists import SensorLists, lists_folder
 
 WHOLE = dinkum.header(factored=False) + dinkum.sensor_list() + dinkum.cycles(dinkum.rows(4))
 
@@ -83,7 +82,7 @@ def test_what_is_no_whole_list_is_not_kept(lists: SensorLists, tmp_path: Path, c
 def test_no_more_lists_are_kept_than_have_room(
     lists: SensorLists, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gliderwatch.slocum.sensor_lists.MOST", 3)
+    monkeypatch.setattr("gliderwatch.slocum.caches.MOST", 3)
     for i in range(1, 6):
         crc = f"0000000{i}"
         head = dinkum.header(factored=False, crc=crc)

@@ -14,13 +14,11 @@ from hypothesis.strategies import SearchStrategy
 from gliderwatch.model import Segment
 from gliderwatch.simulate.delivery import FileForm, write_full_rate, write_mission
 from gliderwatch.simulate.dinkum import Generation
-from gliderwatch.simulate.flight import Thruster
+from gliderwatch.simulate.flight import Point, Thruster
 from gliderwatch.simulate.glider import simulate
-from gliderwatch.simulate.ocean import Constituent, Ellipse, Front, Sea
-from gliderwatch.simulate.onboard import Point
+from gliderwatch.simulate.ocean import Bottom, Constituent, Ellipse, Front, Sea
 from gliderwatch.simulate.scenario import SIZES, Fault, FaultKind, FixIn, Rates, Scenario
 from gliderwatch.simulate.telemetry import SECONDS, SENSORS, TIME, SegmentData
-from gliderwatch.simulate.water import Bottom
 from gliderwatch.slocum.decode import decode
 from gliderwatch.slocum.sensors import QUANTITIES
 

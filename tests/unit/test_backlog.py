@@ -6,7 +6,7 @@ import pytest
 
 from gliderwatch.errors import Quarantine
 from gliderwatch.model import SegmentId
-from gliderwatch.service.triage import AHEAD, Backlog, Job
+from gliderwatch.service.backlog import AHEAD, Backlog, Job
 from gliderwatch.slocum.header import Header
 from gliderwatch.store.state_file import File, Status
 

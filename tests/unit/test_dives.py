@@ -10,7 +10,7 @@ import pytest
 from gliderwatch.model import Dive, Segment, Series, Unusable
 from gliderwatch.navigation.constants import LONGEST_DIVE
 from gliderwatch.navigation.dives import Navigation, extend
-from gliderwatch.navigation.samples import concatenated
+from gliderwatch.navigation.flight import concatenated
 from gliderwatch.navigation.track import closure
 from missions import LAT, LON, START, Leg, cut, mission, opened, segment, series
 

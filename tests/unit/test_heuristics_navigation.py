@@ -10,9 +10,8 @@ from gliderwatch.navigation.dac import Report, new_reports, pair, updated
 from gliderwatch.navigation.dives import Navigation, extend, flight_notes, unsteered, why_unusable
 from gliderwatch.navigation.features import flight_features
 from gliderwatch.navigation.fixes import new_fixes
-from gliderwatch.navigation.flight import Flight, find_flight, lengthened
+from gliderwatch.navigation.flight import Flight, find_flight, lengthened, prepare
 from gliderwatch.navigation.geodesy import from_plane
-from gliderwatch.navigation.samples import prepare
 from gliderwatch.navigation.track import build_track, closure
 from missions import LAT, LON, Leg, mission, segment, series
 

@@ -16,8 +16,7 @@ from rich.console import Console
 from alert_support import DISAGREE, SLOW, alert, incident
 from announcing import Talk, World
 from gliderwatch.cli import manage, tables
-from gliderwatch.cli.incident_list import ack, incident_entries
-from gliderwatch.cli.status import as_json, overview
+from gliderwatch.cli.status import acknowledge_incident, incident_entries, overview, status_as_json
 from gliderwatch.config import Config, load
 from gliderwatch.errors import GliderwatchError, StateError
 from gliderwatch.incidents.acknowledgement import acknowledge, with_mute
@@ -115,8 +114,10 @@ class TestAcknowledged:
             assert acknowledge(flow, "ann", "", 0.0).holds(now) is holds
 
     def test_the_same_once_more_changes_nothing(self, config: Config) -> None:
-        first, is_new = ack(config, "electa/anomaly/1667639520", "ann", "on it", NOW)
-        again, is_new_again = ack(config, "electa/anomaly/1667639520", "ann", "on it", NOW + 60)
+        first, is_new = acknowledge_incident(config, "electa/anomaly/1667639520", "ann", "on it", NOW)
+        again, is_new_again = acknowledge_incident(
+            config, "electa/anomaly/1667639520", "ann", "on it", NOW + 60
+        )
         assert (is_new, is_new_again) == (True, False)
         (kept,) = incident_entries(config)
         assert kept == again == first
@@ -124,15 +125,15 @@ class TestAcknowledged:
         assert (kept.ack.by, kept.ack.note, kept.ack.at) == ("ann", "on it", NOW)
 
     def test_another_note_takes_its_place(self, config: Config) -> None:
-        ack(config, "electa/anomaly/1667639520", "ann", "", NOW)
-        noted, is_new = ack(config, "electa/anomaly/1667639520", "bob", "mine now", NOW + 60)
+        acknowledge_incident(config, "electa/anomaly/1667639520", "ann", "", NOW)
+        noted, is_new = acknowledge_incident(config, "electa/anomaly/1667639520", "bob", "mine now", NOW + 60)
         assert is_new
         assert incident_entries(config) == [noted]
 
     @pytest.mark.parametrize("identity", ["electa/anomaly/7", "electa/anomaly/1", ""])
     def test_what_is_not_open_is_refused_with_what_is(self, config: Config, identity: str) -> None:
         with pytest.raises(GliderwatchError, match=r"open are:\n  electa/anomaly/1667639520$"):
-            ack(config, identity, "ann", "", NOW)
+            acknowledge_incident(config, identity, "ann", "", NOW)
         assert [n.ack for n in incident_entries(config, every=True)] == [None, None]
 
 
@@ -277,7 +278,7 @@ class TestWaiting:
 
     def test_an_acknowledgement_withdraws_what_waits_for_it(self, config: Config) -> None:
         assert self.waiting(config) == [("a1", "mail"), ("a1", "sms"), ("n", "post")]
-        ack(config, incident().id, "ann", "", NOW + 60)
+        acknowledge_incident(config, incident().id, "ann", "", NOW + 60)
         assert self.waiting(config) == [("a1", "mail"), ("n", "post")]
 
     def test_so_does_a_mute(self, config: Config) -> None:
@@ -285,7 +286,7 @@ class TestWaiting:
         assert self.waiting(config) == [("a1", "mail"), ("n", "post")]
 
     def test_what_comes_after_it_is_for_who_was_told(self, config: Config) -> None:
-        ack(config, incident().id, "ann", "", NOW + 60)
+        acknowledge_incident(config, incident().id, "ann", "", NOW + 60)
         with closing(Store.open(Path(config.state.path))) as store:
             correction = [alert("a2", kind=Kind.CORRECTION)]
             post_alerts(
@@ -299,7 +300,7 @@ class TestWaiting:
         monkeypatch.setattr("gliderwatch.cli.status.time.time", lambda: NOW + 60)
         view = overview(config)
         assert [u.channel for u in view.undelivered] == ["mail"]
-        assert as_json(view)["held"] == [
+        assert status_as_json(view)["held"] == [
             {
                 "alert": "a1",
                 "channel": "sms",

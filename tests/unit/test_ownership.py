@@ -12,8 +12,7 @@ import pytest
 
 from gliderwatch.errors import StateError
 from gliderwatch.store import maintenance
-from gliderwatch.store.database import connect, read_only, refuse_foreign
-from gliderwatch.store.ownership import APPLICATION_ID
+from gliderwatch.store.database import APPLICATION_ID, connect, read_only, refuse_foreign
 from gliderwatch.store.state_file import Store
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "schema-1.sqlite.gz"

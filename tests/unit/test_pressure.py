@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gliderwatch.model import Series, readonly
-from gliderwatch.navigation.pressure import LEAST, zeroed
-from gliderwatch.navigation.samples import prepare
+from gliderwatch.navigation.fixes import LEAST, zeroed
+from gliderwatch.navigation.flight import prepare
 from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario

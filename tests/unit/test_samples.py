@@ -5,7 +5,7 @@ import pytest
 
 from gliderwatch.model import Series, readonly
 from gliderwatch.navigation.constants import SPACING
-from gliderwatch.navigation.samples import after, concatenated, downsample, get, joined, prepare
+from gliderwatch.navigation.flight import after, concatenated, downsample, get, joined, prepare
 from missions import segment, series
 
 

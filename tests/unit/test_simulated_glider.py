@@ -5,10 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gliderwatch.simulate.flight import Airframe, steady_glide
+from gliderwatch.simulate.flight import (
+    Airframe,
+    Point,
+    displacement,
+    nmea,
+    offset,
+    own_speed,
+    steady_glide,
+    written,
+)
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.ocean import Constituent, Ellipse, Sea, make_ocean
-from gliderwatch.simulate.onboard import Point, displacement, nmea, offset, own_speed, written
 from gliderwatch.simulate.scenario import FixIn, Scenario
 from simulated import DAY, EVERY_CYCLE, STRAIGHT, closures, degrees, samples
 

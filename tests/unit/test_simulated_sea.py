@@ -6,12 +6,21 @@ import gsw
 import numpy as np
 import pytest
 
+from gliderwatch.simulate.flight import Point, offset
 from gliderwatch.simulate.glider import simulate
-from gliderwatch.simulate.ocean import Constituent, Ellipse, Front, Ocean, Sea, make_ocean
-from gliderwatch.simulate.onboard import Point, offset
+from gliderwatch.simulate.ocean import (
+    Bottom,
+    Constituent,
+    Ellipse,
+    Front,
+    Layer,
+    Ocean,
+    Sea,
+    Water,
+    make_ocean,
+)
 from gliderwatch.simulate.scenario import Mission, Scenario
 from gliderwatch.simulate.telemetry import CADENCE, SCIENCE_CADENCE
-from gliderwatch.simulate.water import Bottom, Layer, Water
 from simulated import samples
 
 DAY = 86400.0

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine, Retry
 from gliderwatch.model import Series, readonly
-from gliderwatch.slocum.worker_result import decoded, encoded
+from gliderwatch.slocum.decode import decoded, encoded
 from missions import Leg, mission
 
 SEGMENT = mission([Leg()])[0]

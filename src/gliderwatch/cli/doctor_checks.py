@@ -22,11 +22,10 @@ from gliderwatch.messages.formatting import clean, duration
 from gliderwatch.messages.samples import sample
 from gliderwatch.model import Alert, Kind, Severity
 from gliderwatch.service.liveness import STALE, is_held, seconds_silent
-from gliderwatch.slocum.caches import Staging
+from gliderwatch.slocum.caches import Staging, lists_folder
 from gliderwatch.slocum.cycles import parse_sensor_list
 from gliderwatch.slocum.folders import Found, find_places, scan
 from gliderwatch.slocum.header import Header, parse_header, plain, read_header, read_regular
-from gliderwatch.slocum.sensor_lists import lists_folder
 from gliderwatch.store.database import SCHEMA
 from gliderwatch.store.watch_health import Failing, failing, quick_check, schema_version
 

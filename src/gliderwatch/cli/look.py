@@ -131,13 +131,12 @@ def status(config_path: Path, as_json: bool) -> None:
     It ends with 0: the service is alive, 1: it is not, 2: that cannot be told.
     """
     from gliderwatch.cli import tables
-    from gliderwatch.cli.status import as_json as machine
-    from gliderwatch.cli.status import overview
+    from gliderwatch.cli.status import overview, status_as_json
     from gliderwatch.config import load
 
     view = overview(load(config_path))
     if as_json:
-        _print_json(machine(view))
+        _print_json(status_as_json(view))
     else:
         tables.status(view, Console())
     sys.exit(0 if view.alive else 1)

@@ -156,13 +156,13 @@ def incidents(config_path: Path, glider: str | None, every: bool, as_json: bool)
     """Tell which incidents are open, and who has acknowledged them."""
     import msgspec
 
-    from gliderwatch.cli import incident_list as manage
     from gliderwatch.cli import tables
+    from gliderwatch.cli.status import incident_entries, incidents_as_json
     from gliderwatch.config import load
 
-    found = manage.incident_entries(load(config_path), glider, every=every)
+    found = incident_entries(load(config_path), glider, every=every)
     if as_json:
-        lines = [manage.as_json(noted) for noted in found]
+        lines = [incidents_as_json(noted) for noted in found]
         click.echo(msgspec.json.format(msgspec.json.encode(lines), indent=2))
     elif found:
         tables.incidents(found, Console())
@@ -208,12 +208,12 @@ def ack(config_path: Path, incident: str, by: str | None, note: str) -> None:
     """
     import getpass
 
-    from gliderwatch.cli import incident_list as manage
     from gliderwatch.cli import tables
+    from gliderwatch.cli.status import acknowledge_incident
     from gliderwatch.config import load
 
     who = by or os.environ.get("SUDO_USER") or getpass.getuser()
-    noted, is_new = manage.ack(load(config_path), incident, who, note, time.time())
+    noted, is_new = acknowledge_incident(load(config_path), incident, who, note, time.time())
     click.echo("acknowledged" if is_new else "was acknowledged already, nothing changed")
     tables.incidents([noted], Console())
 
@@ -223,7 +223,7 @@ def ack(config_path: Path, incident: str, by: str | None, note: str) -> None:
 @config_option
 def backup(config_path: Path, file: Path) -> None:
     """Copy the state to a file while the service runs, and see that the copy is whole."""
-    from gliderwatch.cli.places import not_on_dockserver
+    from gliderwatch.cli.options import not_on_dockserver
     from gliderwatch.config import load
     from gliderwatch.store.maintenance import backup as make
 

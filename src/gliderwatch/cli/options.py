@@ -1,4 +1,4 @@
-"""What the commands share: options, how they fail, and a group whose help is whole."""
+"""What the commands share: options, where they may write, how they fail, a group with its whole help."""
 
 from __future__ import annotations
 
@@ -10,7 +10,29 @@ import click
 from rich.console import Console
 from rich.text import Text
 
+from gliderwatch.config import Config, expand
 from gliderwatch.errors import GliderwatchError
+
+# ----------------------------------------
+# Where a command may write: never below the folders of a dockserver, whose programs take what lies there.
+
+
+def not_on_dockserver(config: Config, file: Path) -> Path:
+    """The file to be written. Raises GliderwatchError where it lies below a folder that is only read."""
+    place = file.parent.resolve() / file.name
+    folders = [*config.dockserver.roots, *config.dockserver.cache]
+    folders += [path for glider in config.gliders.values() for path in glider.paths]
+    for folder in expand(folders):
+        if place.is_relative_to(folder.resolve()):
+            raise GliderwatchError(
+                f"{file} lies below {folder}, where the dockserver's files are: nothing is written there. "
+                "Name another place"
+            )
+    return file
+
+
+# ----------------------------------------
+# What the commands share: options, how they fail, and a group whose help is whole.
 
 DEFAULT = Path("/etc/gliderwatch/gliderwatch.yml")
 """The configuration where none is named."""

@@ -11,19 +11,19 @@ from pathlib import Path
 
 from gliderwatch.cli.manage import known_glider
 from gliderwatch.config import Config, expand
-from gliderwatch.config.fields import is_folder
 from gliderwatch.errors import GliderwatchError, Quarantine, StateError
 from gliderwatch.incidents.constants import SPEED_CHANGE
 from gliderwatch.incidents.notifications import as_notified
 from gliderwatch.messages.formatting import clean, utc
 from gliderwatch.model import Assessment, Flag, Incident, Segment, SegmentId
-from gliderwatch.service import transaction, triage
+from gliderwatch.service import intake, transaction
+from gliderwatch.service.backlog import Job
 from gliderwatch.service.liveness import PidLock, is_held
-from gliderwatch.service.ocean_cache import OceanCache
-from gliderwatch.service.triage import Job
+from gliderwatch.service.runtime import OceanCache
 from gliderwatch.slocum import folders
+from gliderwatch.slocum.caches import lists_folder
 from gliderwatch.slocum.decode import Decoder
-from gliderwatch.slocum.sensor_lists import lists_folder
+from gliderwatch.slocum.folders import is_folder
 from gliderwatch.store import maintenance
 from gliderwatch.store.database import connect, read_only
 from gliderwatch.store.state_file import File, Status, Store
@@ -225,7 +225,7 @@ def _fill(work: _Work, paths: Sequence[str], held: Sequence[SegmentId], on_step:
 def _jobs(work: _Work, paths: Sequence[str], caches: Sequence[Path]) -> Iterator[Job]:
     """The files that are there and can be decoded; of the others, why not."""
     for path in paths:
-        found = triage.triage(Path(path), work.new, caches, lambda name: name == work.glider)
+        found = intake.triage(Path(path), work.new, caches, lambda name: name == work.glider)
         if isinstance(found, Job):
             yield found
         elif found is not None and found.status != Status.UNKNOWN:

@@ -1,4 +1,5 @@
-"""What `gliderwatch status` tells: is the daemon alive, how is each glider, what is in the way."""
+"""`gliderwatch status` and `gliderwatch incidents`: is the daemon alive, how is each glider, what is in the
+way, who has acknowledged."""
 
 from __future__ import annotations
 
@@ -7,17 +8,128 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from gliderwatch.cli.incident_list import ack_json
-from gliderwatch.config import Config, Link, linked_gliders
-from gliderwatch.incidents.acknowledgement import Acks, with_mute
+from gliderwatch.cli.manage import reading, writing
+from gliderwatch.config import Config, linked_gliders
+from gliderwatch.errors import GliderwatchError
+from gliderwatch.incidents.acknowledgement import Ack, Acks, acknowledge, with_mute
 from gliderwatch.incidents.constants import GONE, RECENT
 from gliderwatch.incidents.irregularities import Irregularity
 from gliderwatch.incidents.overdue import ExpectedCall, expected_call, guess, is_launched
+from gliderwatch.messages.formatting import clean
 from gliderwatch.model import Assessment, Incident, NextSurfacing
 from gliderwatch.params import Attention
 from gliderwatch.service.jsonl import assessment_line, iso
 from gliderwatch.service.liveness import STALE, is_held, seconds_silent
+from gliderwatch.service.routing import withdraw_answered
+from gliderwatch.slocum.folders import Link
 from gliderwatch.store.state_file import File, Status, Store, Undelivered
+
+# ----------------------------------------
+# The incidents of all gliders, and who has taken them on.
+
+
+@dataclass(frozen=True, slots=True)
+class IncidentEntry:
+    """An incident and its acknowledgement, if there is one."""
+
+    incident: Incident
+    ack: Ack | None
+
+    @property
+    def is_quiet(self) -> bool:
+        """Whether nobody is reminded of it because of the acknowledgement."""
+        return self.ack is not None and self.ack.holds(self.incident)
+
+
+def incident_entries(
+    config: Config, glider: str | None = None, *, every: bool = False
+) -> list[IncidentEntry]:
+    """The open incidents (`every`: all) of one glider or of all, by glider and time.
+
+    Raises GliderwatchError where nothing is known of the glider asked for.
+    """
+    with reading(config) as store:
+        names = sorted({*config.gliders, *store.gliders()})
+        if glider is not None and glider.lower() not in names:
+            raise GliderwatchError(
+                f"there is no glider {glider}; known are: {', '.join(map(clean, names)) or 'none'}"
+            )
+        wanted = names if glider is None else [glider.lower()]
+        return [noted for name in wanted for noted in _of(store, name, every)]
+
+
+def _of(store: Store, glider: str, every: bool) -> list[IncidentEntry]:
+    acks = store.notes.acks(glider)
+    found = (i for i in store.incidents(glider) if every or i.cleared_at is None)
+    return [IncidentEntry(i, acks.get(i.id)) for i in found]
+
+
+def acknowledge_incident(
+    config: Config, identity: str, by: str, note: str, now: float
+) -> tuple[IncidentEntry, bool]:
+    """Take an open incident on; with it, and whether that is new: the same once more changes nothing.
+
+    Who waits for an acknowledgement is not told of it any more.
+    Raises GliderwatchError, naming those that are open, where it is none of them.
+    """
+    with writing(config) as store:
+        known = [noted for glider in store.gliders() for noted in _of(store, glider, every=True)]
+        noted = next((n for n in known if n.incident.id == identity.strip()), None)
+        if noted is None or noted.incident.cleared_at is not None:
+            raise GliderwatchError(_refusal(identity, noted, known))
+        before = noted.ack
+        if noted.is_quiet and before is not None and (before.by, before.note) == (by, note):
+            return noted, False
+        made = acknowledge(noted.incident, by, note, now)
+        store.notes.acknowledge(noted.incident.glider, made)
+        withdraw_answered(store, noted.incident.glider, now)
+    return IncidentEntry(noted.incident, made), True
+
+
+def _refusal(identity: str, noted: IncidentEntry | None, known: list[IncidentEntry]) -> str:
+    wrong = "there is no incident" if noted is None else "there is nothing left to do: cleared is incident"
+    opened = [n.incident.id for n in known if n.incident.cleared_at is None]
+    listed = "".join(f"\n  {clean(i)}" for i in opened) if opened else " none"
+    return f"{wrong} {clean(identity)}; open are:{listed}"
+
+
+def incidents_as_json(noted: IncidentEntry) -> dict[str, Any]:
+    """An incident for machines."""
+    i = noted.incident
+    return {
+        "id": i.id,
+        "glider": i.glider,
+        "kind": str(i.kind),
+        "severity": i.severity.name.lower(),
+        "since": iso(i.since),
+        "opened_at": iso(i.opened_at),
+        "cleared_at": None if i.cleared_at is None else iso(i.cleared_at),
+        "dives": i.dives,
+        "worst": _dive(i.worst),
+        "last": _dive(i.last),
+        "acknowledged": None if noted.ack is None else ack_json(noted.ack, i),
+    }
+
+
+def ack_json(made: Ack, incident: Incident) -> dict[str, Any]:
+    """An acknowledgement for machines; `worse`: the incident has grown worse since."""
+    return {"by": made.by, "note": made.note, "at": iso(made.at), "worse": not made.holds(incident)}
+
+
+def _dive(a: Assessment) -> dict[str, Any]:
+    return {
+        "t_dive": iso(a.t_dive),
+        "t_surface": iso(a.t_surface),
+        "flag": a.flag,
+        "speed": a.speed,
+        "speed_min": a.speed_min,
+        "speed_max": a.speed_max,
+        "p_e": a.p_e,
+    }
+
+
+# ----------------------------------------
+# What `gliderwatch status` tells: is the daemon alive, how is each glider, what is in the way.
 
 WEEK = 7 * 86400.0
 """Seconds for which `status` tells what a channel refused for good."""
@@ -140,7 +252,7 @@ def _glider(store: Store, name: str, config: Config, now: float) -> GliderStatus
     )
 
 
-def as_json(view: Overview) -> dict[str, Any]:
+def status_as_json(view: Overview) -> dict[str, Any]:
     """The overview for machines."""
     return {
         "alive": view.alive,

@@ -10,8 +10,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from gliderwatch.cli.incident_list import IncidentEntry
-from gliderwatch.cli.status import GliderStatus, Overview
+from gliderwatch.cli.status import GliderStatus, IncidentEntry, Overview
 from gliderwatch.config import Problem
 from gliderwatch.incidents.acknowledgement import Ack
 from gliderwatch.messages.formatting import clean, duration, utc

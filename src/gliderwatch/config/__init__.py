@@ -7,7 +7,7 @@ names.
 
 from __future__ import annotations
 
-from gliderwatch.config.check import Link, check, linked_gliders
+from gliderwatch.config.check import check, linked_gliders
 from gliderwatch.config.document import Problem
 from gliderwatch.config.fields import expand
 from gliderwatch.config.loading import Config, load
@@ -18,7 +18,6 @@ __all__ = [
     "Config",
     "Dockserver",
     "Glider",
-    "Link",
     "Problem",
     "Recipient",
     "State",

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Container, Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Container, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from gliderwatch.config import secrets
 from gliderwatch.config.document import Problem
-from gliderwatch.config.fields import FROM_GLIDER, expand, is_folder
+from gliderwatch.config.fields import expand
 from gliderwatch.config.loading import Config
 from gliderwatch.errors import ConfigError
-from gliderwatch.slocum.folders import is_left_out
+from gliderwatch.slocum.folders import FROM_GLIDER, Link, Survey, is_folder, survey
 
 _CACHES = {".cac", ".ccc"}
 _FREE_BYTES = 200e6
-_DEEPEST = 6
-"""Folders between a root and `from-glider`, as many as the scan goes through."""
-_NOT_OURS = "lost+found"
 _LET_READ = "let this user read it: gliderwatch doctor says by which mode, group or ACL"
 
 
@@ -91,87 +88,32 @@ def _roots(config: Config) -> _Findings:
             yield _error(key, f"{folder} is the folder of one glider", f"give {folder.parent}")
 
 
-@dataclass(slots=True)
-class _Found:
-    """From-glider folders below the roots, by glider, folders on the way to them that are closed, and links
-    in place of the folder of a glider or of its from-glider."""
-
-    gliders: dict[str, list[Path]] = field(default_factory=dict)
-    closed: list[Path] = field(default_factory=list)
-    links: dict[str, Path] = field(default_factory=dict)
-
-    def search(self, folder: Path, depth: int = 0) -> None:
-        """Look as the scan does: at any depth up to its limit, not in archives, and not through links."""
-        try:
-            with os.scandir(folder) as entries:
-                listed = list(entries)
-                inside = sorted(e.name for e in listed if e.is_dir(follow_symlinks=False))
-                links = sorted(e.name for e in listed if e.is_symlink())
-        except OSError:
-            self.closed.append(folder)
-            return
-        self._note_links(folder, links)
-        if FROM_GLIDER in inside:
-            self.gliders.setdefault(folder.name.lower(), []).append(folder / FROM_GLIDER)
-        elif depth < _DEEPEST:
-            for name in inside:
-                if name != _NOT_OURS and not is_left_out(name):
-                    self.search(folder / name, depth + 1)
-
-    def _note_links(self, folder: Path, names: Iterable[str]) -> None:
-        for name in names:
-            link = folder / name
-            if name == FROM_GLIDER and is_folder(link):
-                self.links.setdefault(folder.name.lower(), link)
-            elif is_folder(link / FROM_GLIDER):
-                self.links.setdefault(name.lower(), link)
-
-
-@dataclass(frozen=True, slots=True)
-class Link:
-    """A symbolic link at ``path`` where the files of a glider should be; it leads to those in ``target``."""
-
-    path: Path
-    target: Path
-
-    def __str__(self) -> str:
-        return f"{self.path} is a symbolic link, and links are not followed: its files are not seen"
-
-    @property
-    def cure(self) -> str:
-        """What to write into the configuration, below the glider."""
-        return f"write `paths: [{self.target}]` below the glider"
-
-
 def linked_gliders(config: Config, names: Container[str]) -> dict[str, Link]:
     """Gliders among `names` without a folder that is seen, with the link that stands in its place."""
-    return _linked(config, _found(config), names)
+    return _linked(config, _survey(config), names)
 
 
-def _linked(config: Config, found: _Found, names: Container[str]) -> dict[str, Link]:
+def _linked(config: Config, found: Survey, names: Container[str]) -> dict[str, Link]:
     return {
-        name: Link(path, (path if path.name == FROM_GLIDER else path / FROM_GLIDER).resolve())
-        for name, path in found.links.items()
+        name: link
+        for name, link in found.links.items()
         if name in names and name not in found.gliders and not config.gliders[name].paths
     }
 
 
-def _found(config: Config) -> _Found:
-    found = _Found()
-    for _, root in _folders("dockserver.roots", config.dockserver.roots):
-        if _can_read(root):
-            found.search(root)
-    return found
+def _survey(config: Config) -> Survey:
+    roots = (folder for _, folder in _folders("dockserver.roots", config.dockserver.roots))
+    return survey(folder for folder in roots if _can_read(folder))
 
 
 def _gliders(config: Config) -> _Findings:
-    search = _found(config)
-    found = search.gliders
-    for folder in search.closed:
+    seen = _survey(config)
+    found = seen.gliders
+    for folder in seen.closed:
         yield _warning("dockserver.roots", f"{folder} cannot be read: nothing below it is watched", _LET_READ)
     if not config.gliders:
         yield _warning("gliders", "no glider is configured: none is watched", "add their names")
-    links = _linked(config, search, config.gliders)
+    links = _linked(config, seen, config.gliders)
     for name, glider in config.gliders.items():
         key = f"gliders.{name}"
         yield from _unusable(f"{key}.paths", glider.paths)

@@ -32,8 +32,6 @@ from gliderwatch.model import Severity
 # ----------------------------------------
 # Folders that the settings name by path or pattern.
 
-FROM_GLIDER = "from-glider"
-
 
 def absolute(path: str, info: ValidationInfo) -> str:
     """A path from the settings, made absolute: relative ones start at the folder of the file."""
@@ -49,11 +47,6 @@ def expand(patterns: Iterable[str]) -> list[Path]:
         matches = [pattern] if os.path.lexists(pattern) else sorted(glob.glob(pattern))  # noqa: PTH207
         found.update(dict.fromkeys(map(Path, matches)))
     return list(found)
-
-
-def is_folder(path: Path) -> bool:
-    """Whether a folder is there; False, unlike `Path.is_dir`, also where this user may not look."""
-    return os.path.isdir(path)  # noqa: PTH112
 
 
 # ----------------------------------------

@@ -45,8 +45,8 @@ from gliderwatch.forecast.constants import (
 from gliderwatch.forecast.steering import WAYS, Plan, courses
 from gliderwatch.forecast.timing import quantile
 from gliderwatch.model import Array, Dive, Fix, NextSurfacing, Segment, Unusable
+from gliderwatch.navigation.flight import joined
 from gliderwatch.navigation.geodesy import displacement, from_plane
-from gliderwatch.navigation.samples import joined
 
 # ----------------------------------------
 # What is remembered of past surfacings, and what follows from it for the way ahead.

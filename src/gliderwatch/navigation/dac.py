@@ -14,8 +14,8 @@ import numpy as np
 
 from gliderwatch.model import Current, Segment
 from gliderwatch.navigation.constants import CURRENT_CORRECTED, CURRENT_EARLY, SAME_CURRENT
+from gliderwatch.navigation.flight import joined
 from gliderwatch.navigation.geodesy import magnetic_to_true
-from gliderwatch.navigation.samples import joined
 
 
 @dataclass(frozen=True, slots=True)

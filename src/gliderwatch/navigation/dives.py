@@ -29,10 +29,18 @@ from gliderwatch.navigation.constants import (
 )
 from gliderwatch.navigation.dac import Known, Report, new_reports, pair, updated
 from gliderwatch.navigation.features import flight_features, track_features
-from gliderwatch.navigation.fixes import distance, new_fixes, surface_intervals
-from gliderwatch.navigation.flight import Flight, find_flight, lengthened, unseen
-from gliderwatch.navigation.pressure import zeroed
-from gliderwatch.navigation.samples import Samples, after, concatenated, get, prepare
+from gliderwatch.navigation.fixes import distance, new_fixes, surface_intervals, zeroed
+from gliderwatch.navigation.flight import (
+    Flight,
+    Samples,
+    after,
+    concatenated,
+    find_flight,
+    get,
+    lengthened,
+    prepare,
+    unseen,
+)
 from gliderwatch.navigation.track import build_track
 
 # ----------------------------------------

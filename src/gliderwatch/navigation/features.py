@@ -21,8 +21,7 @@ from gliderwatch.navigation.constants import (
     SPARSE,
     STEEP_PITCH,
 )
-from gliderwatch.navigation.flight import Flight
-from gliderwatch.navigation.samples import Samples, get
+from gliderwatch.navigation.flight import Flight, Samples, get
 from gliderwatch.navigation.track import Closure, has_reckoning, mean_heading
 
 

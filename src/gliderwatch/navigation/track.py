@@ -17,9 +17,8 @@ from gliderwatch.navigation.constants import (
     RECKONED_POSITIONS,
     SPARSE,
 )
-from gliderwatch.navigation.flight import Flight
+from gliderwatch.navigation.flight import Flight, Samples, get
 from gliderwatch.navigation.geodesy import to_plane
-from gliderwatch.navigation.samples import Samples, get
 
 
 def build_track(samples: Samples, flight: Flight, start: Fix, end: Fix) -> Track:

@@ -18,7 +18,7 @@ import structlog
 from gliderwatch.config import Config, load
 from gliderwatch.errors import ConfigError, DamagedError, GliderwatchError
 from gliderwatch.model import Alert
-from gliderwatch.service import liveness, preconditions, state_outage, transaction, triage
+from gliderwatch.service import intake, liveness, preconditions, state_outage, transaction
 from gliderwatch.service.heartbeat import Upkeep
 from gliderwatch.service.intake import Intake
 from gliderwatch.service.liveness import BEAT, PidLock
@@ -271,7 +271,7 @@ class Daemon:
         if isinstance(news, Decoded):
             self._reception.decoded(news)
         elif isinstance(news, FileChanged | ScienceChanged):
-            triage.observe(news.path, self._parts.settling, time.monotonic())
+            intake.observe(news.path, self._parts.settling, time.monotonic())
         elif isinstance(news, CacheChanged):
             self._retry = True
         elif news == signal.SIGHUP:
@@ -286,9 +286,9 @@ class Daemon:
     def _is_still(self, path: Path) -> bool:
         """Whether a file is as it was when it settled; one that has grown since settles anew."""
         settling = self._parts.settling
-        if triage.state(path) in (None, settling.passed(path)):
+        if intake.state(path) in (None, settling.passed(path)):
             return True
-        triage.settle_again(path, settling, time.monotonic())
+        intake.settle_again(path, settling, time.monotonic())
         return False
 
     def _scan(self) -> None:
@@ -303,8 +303,8 @@ class Daemon:
             there.add(found.path)
             settling.observe(found.path, found.size, found.mtime_ns, time.monotonic())
             if not self._caught_up:  # science files that came while nobody watched
-                for path in triage.newer_science(found.path, self._store):
-                    triage.observe(path, settling, time.monotonic())
+                for path in intake.newer_science(found.path, self._store):
+                    intake.observe(path, settling, time.monotonic())
         settling.only(there)
         took = time.monotonic() - begun  # where it takes long there is to be time for more than rescans
         self._next_scan = begun + took + max(took, self._parts.config.dockserver.rescan_seconds)
@@ -318,10 +318,10 @@ class Daemon:
         self._parts.decoder.cache_folders = self._parts.cache_folders()
         for file in self._store.files(Status.WAITING, Status.UNKNOWN):
             path = Path(file.path)
-            if triage.state(path) in (None, (file.size, file.mtime_ns)):
+            if intake.state(path) in (None, (file.size, file.mtime_ns)):
                 self._reception.judge(path)
             else:
-                triage.observe(path, self._parts.settling, time.monotonic())
+                intake.observe(path, self._parts.settling, time.monotonic())
 
     # ------------------------------------------------------------------- life
 

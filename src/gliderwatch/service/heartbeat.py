@@ -21,10 +21,10 @@ from gliderwatch.delivery.channels import scrub
 from gliderwatch.delivery.dispatcher import Dispatcher
 from gliderwatch.errors import ConfigError
 from gliderwatch.model import Alert
+from gliderwatch.service.backlog import Job
 from gliderwatch.service.metrics import Metrics
 from gliderwatch.service.operator_alerts import Operator
 from gliderwatch.service.transaction import FileOutcome
-from gliderwatch.service.triage import Job
 from gliderwatch.store.state_file import Store
 
 log = structlog.get_logger(__name__)

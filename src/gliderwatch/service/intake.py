@@ -1,26 +1,214 @@
-"""What the daemon does with each file that has come, and what it says of its glider."""
+"""The way of a file: seen, settled, judged by its header, decoded, processed, committed; and when its
+glider's messages are due."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import structlog
 
-from gliderwatch.errors import Quarantine, StateError
-from gliderwatch.model import Alert, Segment
-from gliderwatch.service import logs, transaction, triage
+from gliderwatch.errors import MissingCache, NotAssessed, Quarantine, Retry, StateError
+from gliderwatch.model import Alert, Hindrance, Segment
+from gliderwatch.service import logs, transaction
+from gliderwatch.service.backlog import Job
 from gliderwatch.service.heartbeat import Upkeep
 from gliderwatch.service.routing import Routing
 from gliderwatch.service.runtime import Decoded, Runtime
-from gliderwatch.service.triage import Job
 from gliderwatch.slocum import folders
-from gliderwatch.slocum.science import flight_files
+from gliderwatch.slocum.caches import is_there
+from gliderwatch.slocum.calls import Dialog, read_log
+from gliderwatch.slocum.folders import Settling
+from gliderwatch.slocum.header import read_header
+from gliderwatch.slocum.science import flight_files, needs_science, science_files
 from gliderwatch.slocum.watch import CacheChanged
+from gliderwatch.store.codec import plain_decode
 from gliderwatch.store.state_file import File, Status, Store
+
+# ----------------------------------------
+# What to do with a file that has come (decode it, wait, or leave it alone), and the queue of files for the
+# decoder.
+
+# ----------------------------------------
+# Files on their way from settled to taken: in order within a glider, in turn between gliders.
+
+
+# ----------------------------------------
+# What to do with a file that has come: let it settle; once complete, decode it, wait, or leave it alone.
+
+DONE = (Status.TAKEN, Status.DUPLICATE, Status.QUARANTINED)
+
+
+def state(path: Path) -> tuple[int, int] | None:
+    """Size (bytes) and time of change (ns) of a file; None where there is none, zeros where it is closed."""
+    try:
+        status = path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError:
+        return 0, 0
+    return status.st_size, status.st_mtime_ns
+
+
+def observe(path: Path, settling: Settling, now: float) -> None:
+    """Let a file settle that has changed; `now` is monotonic (s)."""
+    try:
+        status = path.lstat()
+    except OSError:  # gone or renamed: its new name is news of its own
+        settling.forget(path)
+        return
+    settling.observe(path, status.st_size, status.st_mtime_ns, now)
+
+
+def settle_again(path: Path, settling: Settling, now: float) -> None:
+    """Let a file settle as if nothing were known of it; `now` is monotonic (s)."""
+    settling.forget(path)
+    observe(path, settling, now)
+
+
+def lacks_depth(flight: Path, store: Store, caches: Sequence[Path]) -> bool:
+    """Whether a flight file that was looked at before, and is as it was, names no sensor of the depth."""
+    before = store.file(_text(flight))
+    if before is None or (before.size, before.mtime_ns) != state(flight):
+        return False
+    try:
+        return needs_science(read_header(flight), caches)
+    except (Quarantine, Retry):
+        return False
+
+
+def newer_science(flight: Path, store: Store) -> list[Path]:
+    """The science files beside a flight file that came after it was looked at, by this machine's clock."""
+    noted = store.noted_at(_text(flight))
+    if noted is None:
+        return []
+    try:
+        return [path for path in science_files(flight) if path.stat().st_ctime > noted]
+    except OSError:
+        return []
+
+
+def triage(
+    path: Path,
+    store: Store,
+    caches: Sequence[Path],
+    is_known: Callable[[str], bool],
+    *,
+    anew: bool = False,
+) -> Job | File | None:
+    """A job where the file is to be decoded, a row for the ledger where not, None where nothing is new.
+
+    Reads nothing but the header, which takes well under a millisecond. `anew`: also one that is done with.
+    """
+    now, before = state(path), store.file(_text(path))
+    if now is None:
+        return _gone(before, store, is_known)
+    is_same = before is not None and (before.size, before.mtime_ns) == now
+    if before is not None and is_same and not anew and _is_settled(before, caches, is_known):
+        return None
+    file = File(_text(path), *now, Status.WAITING)
+    try:
+        header = read_header(_plain(path))
+    except (Quarantine, Retry) as error:
+        return failed(file, error)
+    file = replace(file, glider=header.id.glider, segment=header.id.name, opened_at=header.id.opened_at)
+    if not is_known(header.id.glider):
+        reason = f"glider {header.id.glider} is not in the configuration"
+        return replace(file, status=Status.UNKNOWN, reason=reason)
+    if header.factored and _is_missing(header.crc, caches):
+        return failed(file, MissingCache(header.crc, caches))
+    return Job(file, header)
+
+
+def judge_log(path: Path, store: Store, is_known: Callable[[str], bool]) -> tuple[File, Dialog | None] | None:
+    """The row of a log for the ledger, and what it tells by now if it could be read; None: nothing is new."""
+    now, name = state(path), _text(path)
+    before = store.file(name)
+    if now is None:
+        if before is not None and before.status not in DONE:
+            return replace(before, status=Status.DUPLICATE, reason="is gone"), None
+        return None
+    was_unknown = before is not None and before.status == Status.UNKNOWN and is_known(before.glider)
+    if before is not None and (before.size, before.mtime_ns) == now and not was_unknown:
+        return None
+    file, kept = File(name, *now, Status.TAKEN), store.calls.dialog(name)
+    try:
+        dialog = read_log(_plain(path), None if kept is None else plain_decode(kept, Dialog))
+    except (Quarantine, Retry) as error:
+        return failed(file, error), None
+    return _of_glider(file, dialog.call.glider, is_known), dialog
+
+
+def _of_glider(file: File, glider: str, is_known: Callable[[str], bool]) -> File:
+    """The row of a log that was read, of the glider that it names."""
+    if not glider:
+        reason = "is a log in which no line `Vehicle Name:` says yet of which glider"
+        return replace(file, status=Status.WAITING, reason=reason)
+    if not is_known(glider):
+        reason = f"glider {glider} is not in the configuration"
+        return replace(file, status=Status.UNKNOWN, glider=glider, reason=reason)
+    return replace(file, glider=glider)
+
+
+def _is_settled(before: File, caches: Sequence[Path], is_known: Callable[[str], bool]) -> bool:
+    """Whether nothing more can be done for a file that has not changed."""
+    if before.status == Status.UNKNOWN:
+        return bool(before.glider) and not is_known(before.glider)
+    if before.hindrance is Hindrance.RENAMED:  # it was not read: if it comes back, it is to be
+        return False
+    return before.status in DONE or (bool(before.crc) and _is_missing(before.crc, caches))
+
+
+def _plain(path: Path) -> Path:
+    """The path, if its name can be kept. Raises Quarantine."""
+    if str(path) != _text(path):
+        raise Quarantine("its name is not UTF-8 text: give it another one")
+    return path
+
+
+def failed(file: File, error: Exception) -> File:
+    """The row of a file that could not be decoded."""
+    status, why = Status.QUARANTINED, Hindrance.DAMAGED
+    if isinstance(error, MissingCache):
+        status, why = Status.WAITING, Hindrance.NO_CACHE
+    elif isinstance(error, Retry):
+        status, why = Status.WAITING, Hindrance.UNREADABLE
+    elif isinstance(error, NotAssessed):
+        why = Hindrance.NOT_ASSESSED
+    crc = error.crc if isinstance(error, MissingCache) else ""
+    return replace(file, status=status, reason=str(error), crc=crc, hindrance=why)
+
+
+def _gone(before: File | None, store: Store, is_known: Callable[[str], bool]) -> File | None:
+    """A file that waited and is not there any more: it was renamed, or taken away."""
+    if before is None or before.status in DONE:
+        return None
+    if before.status == Status.UNKNOWN and not is_known(before.glider):
+        return None
+    if not store.segments.is_held(before.glider, before.segment):
+        reason = "is not there any more, and its segment has not come under another name"
+        return replace(before, status=Status.WAITING, reason=reason, crc="", hindrance=Hindrance.GONE)
+    return replace(before, status=Status.DUPLICATE, reason="was renamed", crc="", hindrance=Hindrance.RENAMED)
+
+
+def _is_missing(crc: str, caches: Sequence[Path]) -> bool:
+    """Whether a cache file is in none of the folders; where one cannot be read, the decoder tells why."""
+    try:
+        return not is_there(crc, caches)
+    except OSError:
+        return False
+
+
+def _text(path: Path) -> str:
+    """The path as text that can be kept, whatever bytes are in its name."""
+    return str(path).encode("utf-8", "backslashreplace").decode()
+
+
+# ----------------------------------------
+# What the daemon does with each file that has come, and what it says of its glider.
 
 log = structlog.get_logger(__name__)
 
@@ -61,19 +249,19 @@ class Intake:
             self._judge(path)
             return
         for flight in flight_files(path):
-            if triage.lacks_depth(flight, self._store, self._parts.decoder.cache_folders):
+            if lacks_depth(flight, self._store, self._parts.decoder.cache_folders):
                 self._judge(flight, anew=True)
 
     def _judge(self, path: Path, *, anew: bool = False) -> None:
         caches = self._parts.decoder.cache_folders
-        found = triage.triage(path, self._store, caches, self._is_known, anew=anew)
+        found = triage(path, self._store, caches, self._is_known, anew=anew)
         if isinstance(found, Job):
             self._keep_list(path, found)
             self._upkeep.queued(found)
             self._parts.backlog.add(found)
         elif found is not None:
             self._note(found)
-        if triage.state(path) is None:  # it may come back as it was: a share that was away
+        if state(path) is None:  # it may come back as it was: a share that was away
             self._parts.settling.forget(path)
 
     def _keep_list(self, path: Path, job: Job) -> None:
@@ -144,21 +332,21 @@ class Intake:
 
     def _take(self, job: Job) -> None:
         path, result, glider = Path(job.file.path), job.result, job.header.id.glider
-        if triage.state(path) not in (None, (job.file.size, job.file.mtime_ns)):
+        if state(path) not in (None, (job.file.size, job.file.mtime_ns)):
             # it has grown, or is another one: what was decoded may be of before or of after
             self._again(path)
             self._speak(glider)
         elif isinstance(result, Segment) and result.id == job.header.id:
             self._take_in(job.file, result)
         elif isinstance(result, Exception):
-            self._note(triage.failed(job.file, result))
+            self._note(failed(job.file, result))
         else:  # it was replaced between header and decoding, and has gone since
             self._parts.settling.forget(path)
             self._speak(glider)
 
     def _again(self, path: Path) -> None:
         """Let a file have its turn once more."""
-        triage.settle_again(path, self._parts.settling, time.monotonic())
+        settle_again(path, self._parts.settling, time.monotonic())
 
     def _take_in(self, file: File, segment: Segment) -> None:
         glider = segment.id.glider
@@ -179,13 +367,13 @@ class Intake:
                 )
         except Quarantine as error:
             log.error("file cannot be assessed", path=file.path, glider=glider, exc_info=error.__cause__)
-            self._note(triage.failed(file, error))
+            self._note(failed(file, error))
         else:
             self._told(taken, time.monotonic() - begun)
 
     def _take_log(self, path: Path) -> None:
         """Read on in the log of a call."""
-        found = triage.judge_log(path, self._store, self._is_known)
+        found = judge_log(path, self._store, self._is_known)
         if found is None:
             return
         file, dialog = found

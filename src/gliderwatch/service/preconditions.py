@@ -12,10 +12,10 @@ from pathlib import Path
 
 from gliderwatch import config as settings
 from gliderwatch.config import Config, Problem, expand, secrets
-from gliderwatch.config.fields import is_folder
 from gliderwatch.errors import ConfigError, DamagedError, StateError
 from gliderwatch.service import heartbeat
 from gliderwatch.service.liveness import alive_path
+from gliderwatch.slocum.folders import is_folder
 from gliderwatch.store.database import read_only, refuse_foreign
 
 

@@ -1,12 +1,15 @@
-"""A past mission through the same path as a live one, with a state of its own."""
+"""A past mission through the same path as a live one, with a state of its own; and what it says when nothing
+could be assessed."""
 
 from __future__ import annotations
 
+import os
+import shlex
 import tempfile
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,59 +19,123 @@ from gliderwatch.delivery.channels import Channel
 from gliderwatch.delivery.dispatcher import Dispatcher
 from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine, Retry
 from gliderwatch.incidents.constants import GONE
+from gliderwatch.messages.formatting import clean
 from gliderwatch.model import Alert, Hindrance, Segment
 from gliderwatch.navigation.clock import Stamp, corrections, is_same, numbered
 from gliderwatch.params import GliderParams
-from gliderwatch.service import transaction, triage
+from gliderwatch.service import intake, transaction
+from gliderwatch.service.backlog import Job
 from gliderwatch.service.jsonl import alert_line, assessment_line, write_lines
 from gliderwatch.service.liveness import alive_path
-from gliderwatch.service.ocean_cache import OceanCache
-from gliderwatch.service.replay_logs import Log, find_logs, read_logs
+from gliderwatch.service.replay_order import Log, ReplayOrder, find_logs, read_logs
 from gliderwatch.service.routing import NOBODY, Routing, routing_of
-from gliderwatch.service.triage import Job
+from gliderwatch.service.runtime import OceanCache
+from gliderwatch.slocum import folders
+from gliderwatch.slocum.caches import SensorLists, lists_folder
 from gliderwatch.slocum.decode import Decoder
 from gliderwatch.slocum.folders import kind, rank
 from gliderwatch.slocum.header import read_header
-from gliderwatch.slocum.sensor_lists import SensorLists, lists_folder
 from gliderwatch.store.database import MEMORY, refuse_foreign
 from gliderwatch.store.outbox import Outbox
 from gliderwatch.store.state_file import File, Status, Store
 
 # ----------------------------------------
+# A replay that assessed nothing: why, in one line, and what to do about it.
+
+_ABOVE = 4
+"""Folders above the one replayed in which cache files are looked for, with the folders beside these."""
+_MOST = 2000
+"""Entries of a folder that are looked at."""
+_SHOWN = 3
+
+
+def unassessed(store: Store, folders: Iterable[Path]) -> str | None:
+    """Why the replay of `folders` assessed no dive, with the cure; None where it assessed one."""
+    if any(store.extent(glider)[1] for glider in store.gliders()):
+        return None
+    left_out = {s: store.files(s) for s in (Status.WAITING, Status.UNKNOWN, Status.QUARANTINED)}
+    status = max(left_out, key=lambda s: len(left_out[s]))
+    files = left_out[status]
+    if not files:
+        return "nothing was assessed: the files were read, but none holds a dive"
+    said = {Status.WAITING: _waiting, Status.UNKNOWN: _unknown, Status.QUARANTINED: _bad}[status]
+    return f"nothing was assessed: {said(files, folders)}"
+
+
+def _waiting(files: Sequence[File], folders: Iterable[Path]) -> str:
+    wanted = {file.crc.lower() for file in files if file.crc}
+    if not wanted:
+        return f"{_number(files)} cannot be read now ({clean(files[0].reason)}): try again later"
+    place = nearby(wanted, folders)
+    cure = "name its folder: --cache FOLDER" if place is None else f"add --cache {shlex.quote(_short(place))}"
+    lacking = _some(f"{crc}.cac" for crc in wanted)
+    return f"{_number(files)} {'wait' if len(files) > 1 else 'waits'} for {lacking}: {cure}"
+
+
+def _unknown(files: Sequence[File], _folders: Iterable[Path]) -> str:
+    gliders = {file.glider for file in files}
+    return (
+        f"{_number(files)} of {_some(gliders)}, not in the configuration: "
+        "add the name under `gliders`, or leave -c out"
+    )
+
+
+def _bad(files: Sequence[File], _folders: Iterable[Path]) -> str:
+    return (
+        f"{_number(files)} cannot be used ({clean(files[0].reason)}): "
+        "name a folder with flight data of a glider (sbd, scd, mbd, mcd, dbd, dcd)"
+    )
+
+
+def _number(files: Sequence[File]) -> str:
+    return "1 file" if len(files) == 1 else f"{len(files)} files"
+
+
+def _some(words: Iterable[str]) -> str:
+    found = sorted(words)
+    more = f" and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
+    return ", ".join(clean(word, 60) for word in found[:_SHOWN]) + more
+
+
+def _short(path: Path) -> str:
+    """A path as one would type it here."""
+    relative = os.path.relpath(path)
+    return relative if len(relative) < len(str(path)) else str(path)
+
+
+def nearby(crcs: Collection[str], folders: Iterable[Path]) -> Path | None:
+    """The folder that holds most of the cache files of some checksums (lower case), in, above or beside the
+    `folders`; None where none is found."""
+    held = Counter({place: n for place in _places(folders) if (n := len(_caches(place) & set(crcs)))})
+    return held.most_common(1)[0][0] if held else None
+
+
+def _places(folders: Iterable[Path]) -> Iterator[Path]:
+    for folder in folders:
+        start = folder.resolve()
+        for above in (start, *start.parents)[: _ABOVE + 1]:
+            yield above
+            yield from (Path(entry.path) for entry in _entries(above) if entry.is_dir())
+
+
+def _caches(folder: Path) -> set[str]:
+    """The checksums of the cache files in a folder, as their names tell."""
+    return {Path(entry.name).stem.lower() for entry in _entries(folder) if folders.is_cache(entry.name)}
+
+
+def _entries(folder: Path) -> list[os.DirEntry[str]]:
+    try:
+        with os.scandir(folder) as found:
+            return [entry for entry, _ in zip(found, range(_MOST), strict=False)]
+    except OSError:
+        return []
+
+
+# ----------------------------------------
+# A past mission through the same path as a live one, with a state of its own.
+
+# ----------------------------------------
 # The files of several gliders in the order of their sending: for a replay, whose time is theirs.
-
-LONGEST = 2 * 86400.0
-"""Seconds after which a file is sent at the latest: if the next is opened later, there was a pause."""
-
-
-class ReplayOrder:
-    """Puts decoded jobs, which come as their files were opened, into the order of their sending."""
-
-    def __init__(self, jobs: Iterable[Job]) -> None:
-        self._coming: dict[str, deque[float]] = {}
-        self._ready: dict[str, deque[Job]] = {}
-        for job in jobs:
-            self._coming.setdefault(job.header.id.glider, deque()).append(job.opened_at)
-            self._ready[job.header.id.glider] = deque()
-
-    def after(self, job: Job) -> Iterator[tuple[Job, float]]:
-        """The jobs whose turn it is once one more is decoded, each with the time (s) of its sending."""
-        self._coming[job.header.id.glider].popleft()
-        self._ready[job.header.id.glider].append(job)
-        while heads := [(self._sent(glider), glider) for glider, ready in self._ready.items() if ready]:
-            sent, first = min(heads)
-            if any(c and c[0] < sent and not self._ready[g] for g, c in self._coming.items()):
-                return  # a file that was opened before may have been sent before
-            yield self._ready[first].popleft(), sent
-
-    def _sent(self, glider: str) -> float:
-        """When the first file that is ready was sent: at its end, else before the next was opened."""
-        job, *later = self._ready[glider]
-        if isinstance(job.result, Segment):
-            return job.result.last_t + job.offset
-        opened = job.opened_at
-        coming = [*(j.opened_at for j in later), *self._coming[glider]]
-        return min(next(iter(coming), opened), opened + LONGEST)
 
 
 # ----------------------------------------
@@ -265,7 +332,7 @@ def _triage(
     jobs, noted = list[Job](), list[File]()
 
     def look(path: Path) -> None:
-        found = triage.triage(path, report.store, caches, request.is_wanted)
+        found = intake.triage(path, report.store, caches, request.is_wanted)
         if isinstance(found, Job):
             lists.keep(path, found.header)
             jobs.append(found)
@@ -349,7 +416,7 @@ def _take(
         ocean = None if report.ocean is None else report.ocean.field(glider)
         taken = transaction.process_file(report.store, job.file, job.result, params, told, sent, ocean=ocean)
     except (Quarantine, Retry) as error:
-        taken = transaction.record_file(report.store, triage.failed(job.file, error), params, told, sent)
+        taken = transaction.record_file(report.store, intake.failed(job.file, error), params, told, sent)
     report.coming[glider].popleft()
     report.clock[glider] = max(sent, report.clock.get(glider, sent))
     _count(replace(taken, alerts=(*ticked, *taken.alerts)), report, on_file)

@@ -11,18 +11,71 @@ from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
 
-from gliderwatch.config import Config
+import structlog
+
+from gliderwatch.config import Config, expand
 from gliderwatch.delivery.channels import Channel
 from gliderwatch.delivery.dispatcher import Dispatcher
+from gliderwatch.errors import GliderwatchError
 from gliderwatch.model import Segment
-from gliderwatch.service.ocean_cache import OceanCache
+from gliderwatch.sea.ocean_field import Field
+from gliderwatch.service.backlog import Backlog, Job
 from gliderwatch.service.routing import Routing, routing_of
-from gliderwatch.service.triage import Backlog, Job
+from gliderwatch.slocum.caches import SensorLists, lists_folder
 from gliderwatch.slocum.decode import Decoder
 from gliderwatch.slocum.folders import Settling
-from gliderwatch.slocum.sensor_lists import SensorLists, lists_folder
 from gliderwatch.slocum.watch import Change, Watcher
 from gliderwatch.store.outbox import Outbox
+
+# ----------------------------------------
+# The files of an ocean model, read again when they change.
+
+log = structlog.get_logger(__name__)
+
+
+class OceanCache:
+    """The field of the `ocean:` section; nothing is read while no glider is compared with it."""
+
+    def __init__(self, config: Config) -> None:
+        self._config = config
+        self._seen: tuple[tuple[str, int, int], ...] | None = None
+        self._field: Field | None = None
+
+    def field(self, glider: str) -> Field | None:
+        """The field to compare a glider with; None where none is wanted or the files cannot be read."""
+        if self._config.glider(glider).reference != "model":
+            return None
+        seen = tuple(_state(path) for path in expand(self._config.ocean.files))
+        if seen != self._seen:
+            self._seen, self._field = seen, self._read()
+        return self._field
+
+    def _read(self) -> Field | None:
+        from gliderwatch.sea.ocean_files import Box, read_field  # noqa: PLC0415 (xarray is slow to load)
+
+        ocean = self._config.ocean
+        area = None if ocean.area is None else Box(**dict(ocean.area))
+        try:
+            return read_field(ocean.files, area, ocean.stale_hours * 3600)
+        except GliderwatchError as error:
+            log.warning(
+                "ocean model cannot be read: dives get no reference flow",
+                paths=list(ocean.files),
+                reason=str(error),
+            )
+            return None
+
+
+def _state(path: Path) -> tuple[str, int, int]:
+    try:
+        status = path.stat()
+    except OSError:
+        return str(path), 0, 0
+    return str(path), status.st_size, status.st_mtime_ns
+
+
+# ----------------------------------------
+# What the daemon is made of: everything that follows from one configuration, replaced as a whole.
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,8 @@ from gliderwatch.sea.ocean_field import Field
 from gliderwatch.service.routing import Routing, post_alerts, withdraw_answered
 from gliderwatch.slocum.calls import Dialog
 from gliderwatch.store.codec import plain_encode
-from gliderwatch.store.state_file import File, GliderFacts, Status, Store
+from gliderwatch.store.results import GliderFacts
+from gliderwatch.store.state_file import File, Status, Store
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gliderwatch.model import Array
-from gliderwatch.simulate.onboard import Vector, along_heading, displacement, nmea, offset, own_speed, turn
+from gliderwatch.simulate.flight import Vector, along_heading, displacement, nmea, offset, own_speed, turn
 from gliderwatch.simulate.scenario import DiveTruth
 from gliderwatch.simulate.telemetry import CYCLE, SCIENCE_CYCLE
 from gliderwatch.simulate.vehicle import NODE, Flown, Glider, Motion, fly

@@ -10,8 +10,8 @@ import numpy as np
 
 from gliderwatch.simulate.dinkum import Header
 from gliderwatch.simulate.dive import dive
+from gliderwatch.simulate.flight import Point, displacement, offset
 from gliderwatch.simulate.ocean import Ocean, make_ocean
-from gliderwatch.simulate.onboard import Point, displacement, offset
 from gliderwatch.simulate.scenario import DiveTruth, Mission, Scenario
 from gliderwatch.simulate.surfacing import surface
 from gliderwatch.simulate.telemetry import (

@@ -12,11 +12,9 @@ import numpy as np
 
 from gliderwatch.model import Array
 from gliderwatch.simulate.dinkum import Generation
-from gliderwatch.simulate.flight import Airframe, Thruster
-from gliderwatch.simulate.ocean import Sea
-from gliderwatch.simulate.onboard import Point, Vector
+from gliderwatch.simulate.flight import Airframe, Point, Thruster, Vector
+from gliderwatch.simulate.ocean import Bottom, Sea, Water
 from gliderwatch.simulate.telemetry import CADENCE, CYCLE, SCIENCE_CYCLE, SegmentData, sensor_list
-from gliderwatch.simulate.water import Bottom, Water
 
 # ----------------------------------------
 # What goes wrong with a glider, or only seems to: onset, growth and size of each fault.

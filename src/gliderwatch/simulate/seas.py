@@ -23,11 +23,10 @@ from math import cos, pi, sin, sqrt
 
 import numpy as np
 
-from gliderwatch.simulate.ocean import Constituent, Ellipse, Front, Sea
-from gliderwatch.simulate.onboard import Point, Vector, offset
+from gliderwatch.simulate.flight import Point, Vector, offset
+from gliderwatch.simulate.ocean import Bottom, Constituent, Ellipse, Front, Sea, Water
 from gliderwatch.simulate.scenario import Fault, FixIn, Scenario
 from gliderwatch.simulate.telemetry import CADENCE
-from gliderwatch.simulate.water import Bottom, Water
 from gliderwatch.slocum.sensors import model_declination
 
 Range = tuple[float, float]

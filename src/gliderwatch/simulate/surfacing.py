@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gliderwatch.model import Array
 from gliderwatch.simulate.dive import DR_AWAITING_DIVE, DR_AWAITING_FIX, DR_AWAITING_POSTFIX
-from gliderwatch.simulate.onboard import Point, Vector, displacement, offset, turn, written
+from gliderwatch.simulate.flight import Point, Vector, displacement, offset, turn, written
 from gliderwatch.simulate.scenario import DiveTruth, FixIn
 from gliderwatch.simulate.telemetry import CYCLE, SCIENCE_CYCLE
 from gliderwatch.simulate.vehicle import NODE, Flown, Glider

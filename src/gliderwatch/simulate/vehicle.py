@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gliderwatch.model import Array
-from gliderwatch.simulate.flight import Glide, steady_glide
+from gliderwatch.simulate.flight import Glide, Point, Vector, displacement, offset, steady_glide, turn
 from gliderwatch.simulate.ocean import Ocean
-from gliderwatch.simulate.onboard import Point, Vector, displacement, offset, turn
 from gliderwatch.simulate.scenario import DiveTruth, Health, Scenario
 from gliderwatch.simulate.telemetry import CYCLE, Log
 

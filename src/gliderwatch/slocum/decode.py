@@ -3,7 +3,7 @@
 What dbdreader gets is never the file itself, but a copy in memory of its intact part, and a
 private folder with the one cache file it needs: so it writes nothing beside the data (it keeps
 the sensor list of an unfactored file as a cache file), reads the bytes that were checked, and
-finds compressed files and cache files whatever their names.
+finds compressed files and cache files whatever their names. The result comes back as bytes of msgspec.
 """
 
 from __future__ import annotations
@@ -22,15 +22,17 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, InvalidStateError
 from dataclasses import dataclass
 from functools import cache, partial
+from math import prod
 from pathlib import Path
 from threading import Lock
 from types import ModuleType
 from typing import Any
 
+import msgspec
 import numpy as np
 from pebble import ProcessExpired, ProcessPool
 
-from gliderwatch.errors import GliderwatchError, Quarantine, Retry
+from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine, Retry
 from gliderwatch.model import Segment
 from gliderwatch.slocum import folders
 from gliderwatch.slocum.caches import Scratch, Staging, checksum
@@ -38,7 +40,87 @@ from gliderwatch.slocum.cycles import Sensors, intact, parse_sensor_list
 from gliderwatch.slocum.header import Header, parse_header, plain, read_regular
 from gliderwatch.slocum.science import science_files
 from gliderwatch.slocum.sensors import PRESSURES, SENSORS, TIME, Samples, build_segment, tells_depth
-from gliderwatch.slocum.worker_result import decoded, encoded
+
+# ----------------------------------------
+# What a worker process hands back to the daemon: a segment, or why there is none.
+#
+# MessagePack with the bytes of the arrays as they are, checked against the types of `Segment`. Not pickle:
+# code of C that a damaged file leads astray may have written over the memory of the worker, and a pickle is
+# a program that the daemon would run.
+
+_ERRORS: dict[str, type[GliderwatchError]] = {e.__name__: e for e in (Retry, MissingCache, Quarantine)}
+
+
+class _Decoded(msgspec.Struct, tag=True):
+    segment: Segment
+
+
+class _Array(msgspec.Struct):
+    shape: list[int]
+    f64: bytes
+
+
+class _Failed(msgspec.Struct, tag=True):
+    kind: str
+    arguments: list[Any]
+
+
+def encoded(outcome: Segment | GliderwatchError) -> bytes:
+    """A segment, or an error of `decode`, as bytes. Raises TypeError for anything else."""
+    if isinstance(outcome, GliderwatchError):
+        kind = type(outcome).__name__
+        arguments = outcome.__reduce__()[1] if kind in _ERRORS else (str(outcome),)
+        return msgspec.msgpack.encode(_Failed(kind, [_printable(a) for a in arguments]))
+    if not isinstance(outcome, Segment):
+        raise TypeError(f"no segment but {type(outcome).__name__}")
+    return msgspec.msgpack.encode(_Decoded(outcome), enc_hook=_from_array)
+
+
+def decoded(data: bytes) -> Segment | GliderwatchError:
+    """What `encoded` made into bytes, to the last bit; arrays are read-only.
+
+    An error of another kind than `Retry`, `MissingCache` and `Quarantine` comes back as Quarantine. Raises
+    ValueError for bytes that `encoded` did not make.
+    """
+    found = msgspec.msgpack.decode(data, type=_Decoded | _Failed, dec_hook=_to_array)
+    if isinstance(found, _Decoded):
+        return found.segment
+    try:
+        return _ERRORS.get(found.kind, Quarantine)(*found.arguments)
+    except TypeError as error:
+        raise ValueError(f"no {found.kind}: {error}") from None
+
+
+def _printable(argument: Any) -> Any:
+    """Names of files may hold bytes that are no UTF-8."""
+    if isinstance(argument, str):
+        return argument.encode("utf-8", "backslashreplace").decode()
+    return [_printable(a) for a in argument]
+
+
+def _from_array(value: Any) -> Any:
+    if isinstance(value, np.ndarray) and value.dtype == np.float64:
+        return _Array(list(value.shape), np.ascontiguousarray(value, dtype="<f8").tobytes())
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"no way to hand over {type(value).__name__}")
+
+
+def _to_array(kind: Any, value: Any) -> Any:
+    """Raises TypeError or ValueError, of which msgspec makes a ValidationError (a ValueError)."""
+    array = msgspec.convert(value, _Array)
+    if prod(array.shape) * 8 != len(array.f64):
+        raise ValueError("an array of another size than its shape")
+    return np.frombuffer(array.f64, dtype="<f8").reshape(array.shape)  # of bytes, so read-only
+
+
+# ----------------------------------------
+# A file becomes a `Segment`, by dbdreader, which is imported only here and only in worker processes.
+#
+# What dbdreader gets is never the file itself, but a copy in memory of its intact part, and a
+# private folder with the one cache file it needs: so it writes nothing beside the data (it keeps
+# the sensor list of an unfactored file as a cache file), reads the bytes that were checked, and
+# finds compressed files and cache files whatever their names.
 
 _LARGEST = 512 * 1024 * 1024
 _SCIENCE_TIME = "sci_m_present_time"

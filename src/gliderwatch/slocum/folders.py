@@ -9,7 +9,7 @@ import re
 import stat
 from calendar import timegm
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 
 # ----------------------------------------
@@ -135,6 +135,8 @@ LOGS = "logs"
 """Folder beside `from-glider` with the logs of calls."""
 IGNORED = frozenset({"unknown", "archive"})
 """Folders whose files are noise, or old."""
+_NOT_OURS = "lost+found"
+"""Folder of the file system itself, closed to all but root."""
 _DEEPEST = 6
 """Folders between a root and `from-glider`, so that a wrong root does not mean the whole disk."""
 
@@ -236,6 +238,63 @@ def _scan(
         for name in sorted(folders):
             if not is_left_out(name):
                 yield from _scan(folder / name, glider_folder, depth + 1, seen, unread)
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A symbolic link at ``path`` where the files of a glider should be; it leads to those in ``target``."""
+
+    path: Path
+    target: Path
+
+    def __str__(self) -> str:
+        return f"{self.path} is a symbolic link, and links are not followed: its files are not seen"
+
+    @property
+    def cure(self) -> str:
+        """What to write into the configuration, below the glider."""
+        return f"write `paths: [{self.target}]` below the glider"
+
+
+@dataclass(slots=True)
+class Survey:
+    """What lies below some roots: folders `from-glider` by glider, folders on the way to them that are
+    closed, and by glider the links in place of its folder or of its `from-glider`."""
+
+    gliders: dict[str, list[Path]] = field(default_factory=dict)
+    closed: list[Path] = field(default_factory=list)
+    links: dict[str, Link] = field(default_factory=dict)
+
+
+def survey(roots: Iterable[Path]) -> Survey:
+    """The folders of gliders below some roots, found as `scan` finds them; no file is looked at."""
+    found = Survey()
+    for root in roots:
+        _survey(root, 0, found)
+    return found
+
+
+def _survey(folder: Path, depth: int, found: Survey) -> None:
+    try:
+        with os.scandir(folder) as entries:
+            listed = list(entries)
+            inside = sorted(entry.name for entry in listed if entry.is_dir(follow_symlinks=False))
+            links = sorted(entry.name for entry in listed if entry.is_symlink())
+    except OSError:
+        found.closed.append(folder)
+        return
+    for name in links:
+        link = folder / name
+        if name == FROM_GLIDER and is_folder(link):
+            found.links.setdefault(folder.name.lower(), Link(link, link.resolve()))
+        elif is_folder(link / FROM_GLIDER):
+            found.links.setdefault(name.lower(), Link(link, (link / FROM_GLIDER).resolve()))
+    if FROM_GLIDER in inside:
+        found.gliders.setdefault(folder.name.lower(), []).append(folder / FROM_GLIDER)
+    elif depth < _DEEPEST:
+        for name in inside:
+            if name != _NOT_OURS and not is_left_out(name):
+                _survey(folder / name, depth + 1, found)
 
 
 def _files(entries: Iterable[os.DirEntry[str]], glider_folder: str) -> Iterator[Found]:

@@ -16,7 +16,6 @@ from gliderwatch.incidents.notifications import NotificationState
 from gliderwatch.model import Alert, SegmentId
 from gliderwatch.pipeline import GliderState
 from gliderwatch.store import codec
-from gliderwatch.store.clocks import FIRST
 from gliderwatch.store.database import (
     DAMAGE,
     DELIVERY_BY_WORDS,
@@ -27,6 +26,7 @@ from gliderwatch.store.database import (
     refuse_foreign,
 )
 from gliderwatch.store.outbox import post
+from gliderwatch.store.segments import FIRST
 
 # ----------------------------------------
 # A copy of the state file of one moment, made while the service writes, and proved to be whole.

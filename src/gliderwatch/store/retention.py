@@ -19,7 +19,7 @@ from gliderwatch.model import Incident, SegmentId
 from gliderwatch.navigation.clock import is_same
 from gliderwatch.pipeline import GliderState
 from gliderwatch.store import codec
-from gliderwatch.store.clocks import FIRST
+from gliderwatch.store.segments import FIRST
 
 AT_ONCE = 500
 """Rows removed in one transaction."""

@@ -1,0 +1,232 @@
+"""What a state file holds of one glider, as the rules ask for it, and what people noted by command."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+
+from gliderwatch.incidents.acknowledgement import Ack, Acks
+from gliderwatch.incidents.constants import GONE
+from gliderwatch.incidents.irregularities import PLACES, Coming, Irregularity, found
+from gliderwatch.incidents.overdue import Sign
+from gliderwatch.messages.unjudged_text import Unjudged
+from gliderwatch.model import (
+    Assessment,
+    Call,
+    Fix,
+    Hindrance,
+    Incident,
+    NextSurfacing,
+    Unusable,
+)
+from gliderwatch.store import codec, segments
+from gliderwatch.store.codec import values
+
+
+def _of_dive(dive: Assessment) -> Unjudged:
+    return Unjudged(dive.t_dive, dive.t_surface, dive.unusable, dive.reason)
+
+
+class Annotations:
+    """The notes of people in a state file, on the connection of its store."""
+
+    def __init__(self, connection: sqlite3.Connection) -> None:
+        self._db = connection
+
+    def muted_until(self, glider: str) -> float | None:
+        """Until when (s) a glider is muted by command; None: it is not."""
+        row = self._one("SELECT until FROM mutes WHERE glider = ?", glider)
+        return None if row is None else float(row[0])
+
+    def mute(self, glider: str, until: float, now: float) -> None:
+        """Tell nothing of a glider until a time (s), in place of what was noted before."""
+        self._db.execute("INSERT OR REPLACE INTO mutes VALUES (?, ?, ?)", (glider, until, now))
+
+    def unmute(self, glider: str, now: float) -> None:
+        """End a mute at a time (s)."""
+        self._db.execute("UPDATE mutes SET until = min(until, ?) WHERE glider = ?", (now, glider))
+
+    def unmuted(self, after: float, until: float) -> list[str]:
+        """The gliders whose mute by command ended `after` a time and `until` another (s)."""
+        return [
+            row[0]
+            for row in self._db.execute(
+                "SELECT glider FROM mutes WHERE until > ? AND until <= ?", (after, until)
+            )
+        ]
+
+    def acknowledge(self, glider: str, ack: Ack) -> None:
+        """Keep an acknowledgement, in place of an earlier one of its incident."""
+        row = (ack.incident, glider, ack.at, codec.plain_encode(ack))
+        self._db.execute("INSERT OR REPLACE INTO acks VALUES (?, ?, ?, ?)", row)
+
+    def acks(self, glider: str) -> Acks:
+        """The acknowledgements of a glider's incidents."""
+        if not self._is_there("acks"):
+            return {}
+        rows = self._db.execute("SELECT data FROM acks WHERE glider = ?", (glider,))
+        return {ack.incident: ack for ack in (codec.plain_decode(row[0], Ack) for row in rows)}
+
+    def _one(self, sql: str, glider: str) -> sqlite3.Row | None:
+        if not self._is_there("mutes"):
+            return None
+        row: sqlite3.Row | None = self._db.execute(sql, (glider,)).fetchone()
+        return row
+
+    def _is_there(self, table: str) -> bool:
+        """Whether there is such a table: `status` also reads a file that the service has not migrated yet."""
+        sql = "SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name = ?"
+        return self._db.execute(sql, (table,)).fetchone() is not None
+
+
+class GliderFacts:
+    """What `rules` asks of one glider (each `Known` there), on the connection of its store."""
+
+    def __init__(self, connection: sqlite3.Connection, glider: str) -> None:
+        self._db, self.glider = connection, glider
+
+    def incidents(self) -> tuple[Incident, ...]:
+        """All its incidents, in order of time."""
+        sql = "SELECT data FROM incidents WHERE glider = ? ORDER BY opened_at, id"
+        return tuple(values(self._db, sql, (self.glider,), Incident))
+
+    def dive(self, t_dive: float) -> Assessment | None:
+        """The dive that began at a time (s)."""
+        sql = "SELECT data FROM assessments WHERE glider = ? AND t_dive = ?"
+        return next(iter(values(self._db, sql, (self.glider, t_dive), Assessment)), None)
+
+    def last_surfacing(self, until: float) -> Assessment | None:
+        """The last dive whose end is known and not after `until` (s)."""
+        sql = (
+            "SELECT data FROM assessments WHERE glider = ? AND ended = 1 AND t_surface <= ? "
+            "ORDER BY t_surface DESC LIMIT 1"
+        )
+        return next(iter(values(self._db, sql, (self.glider, until), Assessment)), None)
+
+    def expected(self, until: float) -> NextSurfacing | None:
+        """What was expected after the last surfacing at `until` (s) or before."""
+        sql = (
+            "SELECT data FROM expected WHERE glider = ? AND after <= ? "
+            "ORDER BY after DESC, opened_at DESC LIMIT 1"
+        )
+        return next(iter(values(self._db, sql, (self.glider, until), NextSurfacing)), None)
+
+    def first_surfacing(self, after: float) -> float | None:
+        """The first surfacing later than `after` (s)."""
+        sql = "SELECT min(t_surface) FROM assessments WHERE glider = ? AND ended = 1 AND t_surface > ?"
+        found: float | None = self._db.execute(sql, (self.glider, after)).fetchone()[0]
+        return found
+
+    def has_dived(self, since: float) -> bool:
+        """Whether a dive began at `since` (s) or later, also one that has not ended or cannot be used.
+
+        A time without files that has not ended with a fix is none; it has headings at its two ends at most.
+        """
+        sql = (
+            "SELECT EXISTS (SELECT 1 FROM assessments WHERE glider = ? AND t_dive >= ? "
+            "AND (ended = 1 OR json_extract(data, '$.n_samples') > 2))"
+        )
+        return bool(self._db.execute(sql, (self.glider, since)).fetchone()[0])
+
+    def judged(self, until: float) -> float | None:
+        """The last surfacing (s) at `until` (s) or before whose dive has a flag."""
+        sql = (
+            "SELECT t_surface FROM assessments WHERE glider = ? AND ended = 1 AND t_surface <= ? "
+            "AND flag IS NOT NULL ORDER BY t_surface DESC LIMIT 1"
+        )
+        row = self._db.execute(sql, (self.glider, until)).fetchone()
+        return None if row is None else float(row[0])
+
+    def unjudged(self, since: float) -> tuple[Unjudged, ...]:
+        """Dives without a flag, and files that were not taken, that began later than `since` (s)."""
+        sql = (
+            "SELECT data FROM assessments WHERE glider = ? AND t_dive > ? AND flag IS NULL "
+            "AND (ended = 1 OR json_extract(data, '$.n_samples') > 2)"
+        )
+        dives = values(self._db, sql, (self.glider, since), Assessment)
+        return (*map(_of_dive, dives), *self._not_taken(since), *self._empty(since))
+
+    def _not_taken(self, since: float) -> Iterator[Unjudged]:
+        """Segments of which a file came, but none that could be taken."""
+        sql = (
+            "SELECT h.opened_at, h.at, f.hindrance, f.reason, f.crc FROM heard h "
+            "JOIN files f ON f.glider = h.glider AND f.segment = h.segment "
+            "WHERE h.glider = ?1 AND h.opened_at > ?2 AND f.status IN ('waiting', 'quarantined') "
+            "AND f.hindrance != 'gone' AND NOT EXISTS "
+            "(SELECT 1 FROM segments s WHERE s.glider = h.glider AND s.name = h.segment) "
+            "GROUP BY h.segment"
+        )
+        for row in self._db.execute(sql, (self.glider, since)):
+            cause = Hindrance(row[2]) if row[2] else None
+            yield Unjudged(row[0], row[1], cause, row[3], row[4])
+
+    def _empty(self, since: float) -> Iterator[Unjudged]:
+        """Segments of which a file was taken that holds nothing."""
+        sql = "SELECT opened_at, at FROM heard WHERE glider = ? AND opened_at > ? AND last_t <= opened_at"
+        for row in self._db.execute(sql, (self.glider, since)):
+            yield Unjudged(row[0], row[1], Unusable.DATA_MISSING, "its file holds no data")
+
+    def irregularities(self, now: float) -> list[Irregularity]:
+        """What is wrong with its files, as known at `now` (s)."""
+        steps = segments.steps(self._db, self.glider)
+        return found(self.glider, steps, self.places(PLACES), self.comings(now - GONE, now))
+
+    def places(self, n: int) -> list[Fix]:
+        """Where and when it surfaced the last `n` times that are known, in order of time."""
+        sql = (
+            "SELECT t_surface, json_extract(data, '$.lat'), json_extract(data, '$.lon') FROM assessments "
+            "WHERE glider = ? AND ended = 1 ORDER BY t_surface DESC LIMIT ?"
+        )
+        rows = self._db.execute(sql, (self.glider, n)).fetchall()
+        return [Fix(*row) for row in reversed(rows) if row[1] is not None and row[2] is not None]
+
+    def comings(self, since: float, until: float) -> list[Coming]:
+        """Its segments of which the first file came between two times (s), in that order."""
+        sql = (
+            "SELECT segment, coalesce(last_t, opened_at), at, "
+            "(SELECT min(at) FROM heard WHERE glider = ?1) "
+            "FROM heard WHERE glider = ?1 AND at BETWEEN ?2 AND ?3 ORDER BY at"
+        )
+        return [Coming(*row) for row in self._db.execute(sql, (self.glider, since, until))]
+
+    def signs(self, since: float) -> tuple[Sign, ...]:
+        """Its files that were opened at `since` (s) or later, or that came since, and its calls."""
+        sql = "SELECT opened_at, last_t, at FROM heard WHERE glider = ?1 AND (opened_at >= ?2 OR at >= ?2)"
+        files = (Sign(*row) for row in self._db.execute(sql, (self.glider, since)))
+        return (*files, *self._call_signs(since))
+
+    def _call_signs(self, since: float) -> Iterator[Sign]:
+        """Its calls; a state file of an earlier release, which may be looked at, has none."""
+        if not self._db.execute("SELECT 1 FROM sqlite_schema WHERE name = 'calls'").fetchone():
+            return
+        sql = "SELECT began, last_t, at FROM calls WHERE glider = ? AND last_t >= ?"
+        for row in self._db.execute(sql, (self.glider, since)):
+            yield Sign(row[0], row[1], row[2], is_call=True)
+
+    def calls(self, since: float) -> tuple[Call, ...]:
+        """Its calls that went on at `since` (s) or later, in order of time."""
+        sql = "SELECT call FROM calls WHERE glider = ? AND last_t >= ? ORDER BY began, path"
+        return tuple(values(self._db, sql, (self.glider, since), Call))
+
+
+class Calls:
+    """The calls in a state file, on the connection of its store."""
+
+    def __init__(self, connection: sqlite3.Connection) -> None:
+        self._db = connection
+
+    def dialog(self, path: str) -> str | None:
+        """How far the log at a path was read, as it was kept; None where it was not."""
+        row = self._db.execute("SELECT dialog FROM calls WHERE path = ?", (path,)).fetchone()
+        return None if row is None else str(row[0])
+
+    def keep(self, path: str, call: Call, dialog: str, now: float) -> None:
+        """Keep what the log at a path tells by now, and how far it was read."""
+        row = (path, call.glider, call.began, call.last_t, now, codec.plain_encode(call), dialog)
+        self._db.execute(
+            "INSERT INTO calls VALUES (?, ?, ?, ?, ?, ?, ?) ON CONFLICT (path) DO UPDATE SET "
+            "glider = excluded.glider, began = excluded.began, last_t = excluded.last_t, "
+            "at = iif(last_t = excluded.last_t, at, excluded.at), "
+            "call = excluded.call, dialog = excluded.dialog",
+            row,
+        )
