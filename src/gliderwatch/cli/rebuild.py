@@ -256,7 +256,9 @@ def _take(
     params, field_ = work.config.glider(work.glider), ocean.field(work.glider)
     try:
         with work.new.followed_by(following):
-            taken = transaction.process_file(work.new, file, segment, params, None, time.time(), ocean=field_)
+            taken = transaction.process_file(
+                work.new, file, segment, params, None, time.time(), ocean=field_, limits={}
+            )
     except Quarantine as error:
         work.problems.append((file.path or segment.id.name, str(error)))
         return

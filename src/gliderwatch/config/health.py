@@ -40,7 +40,9 @@ def _section(rule: Rule) -> Any:
     """The section of one rule."""
     fields = {limit.name: _field(limit) for limit in rule.limits}
     name = "".join(word.title() for word in rule.name.split("_"))
-    made = create_model(f"{name}Rule", __base__=RuleSection, __doc__=f"{rule.about} `off` leaves it out.", **fields)
+    made = create_model(
+        f"{name}Rule", __base__=RuleSection, __doc__=f"{rule.about} `off` leaves it out.", **fields
+    )
     return made, Field(default=made(), description=rule.about)
 
 
@@ -53,8 +55,8 @@ else:
     Health = create_model(
         "Health",
         __base__=Section,
-        __doc__="Rules of health: leaks, battery, devices, attitude. Instead of its limits a rule may have the "
-        "word `off`; a limit that is null is not looked at.",
+        __doc__="Rules of health: leaks, battery, devices, attitude. Instead of its limits a rule may have "
+        "the word `off`; a limit that is null is not looked at.",
         **{rule.name: _section(rule) for rule in rules.RULES},
     )
 

@@ -25,13 +25,17 @@ def _altitude(history: History, limits: Limits) -> Finding | None:
     low = run(history, "altitude", lambda v: v < factor * least)
     if low is None:
         return None
-    text = f"{low.v.min():.1f} m above the bottom, twice in a row below {factor:g} x the minimum of {least:g} m"
+    text = (
+        f"{low.v.min():.1f} m above the bottom, twice in a row below {factor:g} x the minimum of {least:g} m"
+    )
     return found("altitude", Severity.WARNING, float(low.t[0]), text, history, "altitude")
 
 
 def _roll(history: History, limits: Limits) -> Finding | None:
     step = limits["step"]
-    return None if step is None else _step(history, "roll", "roll_in_flight", "roll", np.degrees(1), "deg", step)
+    return (
+        None if step is None else _step(history, "roll", "roll_in_flight", "roll", np.degrees(1), "deg", step)
+    )
 
 
 def _motors(history: History, limits: Limits) -> Finding | None:
@@ -97,15 +101,22 @@ ROLL = Rule(
     "roll",
     ("roll_in_flight",),
     _roll,
-    (
-        Limit("step", 15, "degree", 1, 180, "Two dives in a row so far off are a warning.", _DEGREE),
-    ),
+    (Limit("step", 15, "degree", 1, 180, "Two dives in a row so far off are a warning.", _DEGREE),),
     "A step of the roll against the mission's own: a lost wing, a load.",
 )
 MOTORS = Rule(
     "motors",
     tuple(f"{name}_error" for name in COMMANDED),
     _motors,
-    (Limit("beyond", BEYOND, "", 2, 100, "Robust standard deviations of the usual difference, twice in a row."),),
+    (
+        Limit(
+            "beyond",
+            BEYOND,
+            "",
+            2,
+            100,
+            "Robust standard deviations of the usual difference, twice in a row.",
+        ),
+    ),
     "Ballast, oil, battery position and fin: measured against commanded.",
 )

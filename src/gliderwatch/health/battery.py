@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from math import inf, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from gliderwatch.health.constants import BLOCK, CONFIDENCE, DAY, FIT, FULL, LEAST_BLOCKS, THRUSTER
@@ -160,7 +161,7 @@ def _blocks(series: Series) -> tuple[Array, Array]:
     return (edges[1:] + edges[:-1]) / 2, -np.diff(values) / BLOCK
 
 
-def _is_with(times: Array, thruster: Series) -> Array:
+def _is_with(times: Array, thruster: Series) -> NDArray[np.bool_]:
     """At which blocks the thruster was used."""
     if not len(thruster):
         return np.zeros(len(times), dtype=np.bool_)
@@ -202,7 +203,9 @@ END = Rule(
     ("battery_charge", "charge_used", "battery_voltage"),
     _battery_end,
     (
-        Limit("warning_days", 14, "days", 0, 1000, "Less left is a warning, where no recovery is planned.", DAY),
+        Limit(
+            "warning_days", 14, "days", 0, 1000, "Less left is a warning, where no recovery is planned.", DAY
+        ),
         Limit("critical_days", 7, "days", 0, 1000, "Less left is critical.", DAY),
         Limit("reserve", 10, "%", 0, 100, "The battery ends at this part of its charge.", 0.01),
         Limit("capacity", None, "Ah", 1, 10000, "Of a full battery; null: coulombs are not used.", FULL),

@@ -53,7 +53,9 @@ def _mission_time(history: History, limits: Limits) -> Finding | None:
     for which, severity in (("critical", Severity.CRITICAL), ("warning", Severity.WARNING)):
         limit = limits[which]
         if limit is not None and now > limit:
-            text = f"the mission runs for {now / DAY:.1f} days, more than {limit / DAY:.0f}; it may abort at 45"
+            text = (
+                f"the mission runs for {now / DAY:.1f} days, more than {limit / DAY:.0f}; it may abort at 45"
+            )
             return found("mission_time", severity, float(series.t[-1]), text, history, "mission_time")
     return None
 

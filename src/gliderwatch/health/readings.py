@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -139,8 +140,8 @@ def _vacuum(vacuum: Series, temperature: Series, depth: Series, t: float) -> Rea
     """Density of the gas in the hull by its pressure and temperature, apart for depth and surface.
 
     Pascal a kelvin: p / T, which only a leak changes (and the bladder, which fills at the surface). One value
-    a file, the median; none where no temperature is sent. Where no depth is sent (in a call) it is that of the
-    surface.
+    a file, the median; none where no temperature is sent. Where no depth is sent (in a call) it is that of
+    the surface.
     """
     if not len(vacuum) or not len(temperature):
         return {}
@@ -198,7 +199,7 @@ def _thinned(series: Series, of_bin: Callable[[Array], float]) -> Series:
     first = len(v) - SHOWN
     edges = np.linspace(0, first, BINS + 1).astype(int)
     t = [float(series.t[j - 1]) for j in edges[1:]]
-    bins = [float(of_bin(smooth[i:j])) for i, j in zip(edges[:-1], edges[1:], strict=True)]
+    bins = [float(of_bin(smooth[i:j])) for i, j in pairwise(edges)]
     return _series([*t, *series.t[first:]], [*bins, *v[first:]])
 
 

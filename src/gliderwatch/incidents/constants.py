@@ -86,3 +86,7 @@ WEEK = 7.0
 """and then each time after so many days."""
 SLACK = 0.2
 """Of a day: so much sooner a reminder may come; surfacings do not fall on full days."""
+
+HEALTH_CLEAR_AFTER = 4
+"""Segments or calls in a row in which a rule of health finds nothing that clear its incident: the file and
+the log of two surfacings. One that is at its limit is not told again at each."""

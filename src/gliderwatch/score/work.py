@@ -302,7 +302,9 @@ def _fed(segments: Iterable[Segment], config: Config) -> tuple[Store, tuple[Open
     store, told = Store.open(MEMORY), list[OpenedIncident]()
     for segment in segments:
         file = File(segment.id.name, 0, 0, Status.WAITING, segment.id.glider, segment.id.name)
-        taken = transaction.process_file(store, file, segment, config.glider(segment.id.glider), NOBODY, 0.0)
+        taken = transaction.process_file(
+            store, file, segment, config.glider(segment.id.glider), NOBODY, 0.0, limits={}
+        )
         told += _openings(taken.alerts, segment.last_t)
     return store, tuple(told)
 

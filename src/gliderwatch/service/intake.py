@@ -363,7 +363,15 @@ class Intake:
             now, ocean = time.time(), self._parts.ocean.field(glider)
             with self._store.followed_by(self._parts.backlog.behind(glider)):
                 taken = transaction.process_file(
-                    self._store, file, segment, params, speaking, now, self._is_stopping, ocean
+                    self._store,
+                    file,
+                    segment,
+                    params,
+                    speaking,
+                    now,
+                    self._is_stopping,
+                    ocean,
+                    self._parts.config.health(glider),
                 )
         except Quarantine as error:
             log.error("file cannot be assessed", path=file.path, glider=glider, exc_info=error.__cause__)
@@ -379,7 +387,8 @@ class Intake:
         file, dialog = found
         params, speaking = self._parts.config.glider(file.glider), self._speaking(file.glider)
         before = self._store.file(file.path)
-        taken = transaction.take_log(self._store, file, dialog, params, speaking, time.time())
+        limits = self._parts.config.health(file.glider)
+        taken = transaction.take_log(self._store, file, dialog, params, speaking, time.time(), limits)
         if before is None or before.status != file.status:  # not once for each line that comes
             self._told(taken)
         else:

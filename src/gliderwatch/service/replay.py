@@ -9,7 +9,7 @@ import tempfile
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,6 +18,8 @@ from gliderwatch.config import Config, expand
 from gliderwatch.delivery.channels import Channel
 from gliderwatch.delivery.dispatcher import Dispatcher
 from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine, Retry
+from gliderwatch.health.rule import Limits
+from gliderwatch.health.rules import usual_limits
 from gliderwatch.incidents.constants import GONE
 from gliderwatch.messages.formatting import clean
 from gliderwatch.model import Alert, Hindrance, Segment
@@ -165,6 +167,10 @@ class Request:
     def params(self, glider: str) -> GliderParams:
         """The parameters of a glider."""
         return GliderParams() if self.config is None else self.config.glider(glider)
+
+    def limits(self, glider: str) -> Mapping[str, Limits]:
+        """The limits of the rules of health of a glider."""
+        return usual_limits() if self.config is None else self.config.health(glider)
 
     def is_wanted(self, glider: str) -> bool:
         """Whether a glider is to be replayed: the one named, else those of the configuration, else all."""
@@ -414,7 +420,10 @@ def _take(
         if not isinstance(job.result, Segment):
             raise job.result if job.result is not None else Retry("was not decoded")
         ocean = None if report.ocean is None else report.ocean.field(glider)
-        taken = transaction.process_file(report.store, job.file, job.result, params, told, sent, ocean=ocean)
+        limits = request.limits(glider)
+        taken = transaction.process_file(
+            report.store, job.file, job.result, params, told, sent, ocean=ocean, limits=limits
+        )
     except (Quarantine, Retry) as error:
         taken = transaction.record_file(report.store, intake.failed(job.file, error), params, told, sent)
     report.coming[glider].popleft()
@@ -432,7 +441,8 @@ def _take_log(
     """Let the clock run until a call was over, and take its log."""
     glider, is_taken = log.file.glider, log.file.status is Status.TAKEN
     ticked = _tick(report, told, log.sent) if is_taken else []
-    taken = transaction.take_log(report.store, log.file, log.dialog, request.params(glider), told, log.sent)
+    params, limits = request.params(glider), request.limits(glider)
+    taken = transaction.take_log(report.store, log.file, log.dialog, params, told, log.sent, limits)
     if is_taken:
         report.coming[glider].popleft()
         report.clock[glider] = max(log.sent, report.clock.get(glider, log.sent))

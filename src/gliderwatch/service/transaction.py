@@ -6,6 +6,9 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from gliderwatch.errors import GliderwatchError, NotAssessed
+from gliderwatch.health.readings import of_call, of_segment
+from gliderwatch.health.rule import Limits
+from gliderwatch.health.rules import usual_limits
 from gliderwatch.incidents import aborts, irregularities, overdue, unjudged
 from gliderwatch.incidents import calls as without_files
 from gliderwatch.incidents.acknowledgement import with_mute
@@ -14,6 +17,7 @@ from gliderwatch.incidents.notifications import NotificationState, due_notificat
 from gliderwatch.incidents.send_schedule import AT_ONCE, Wait
 from gliderwatch.messages.overdue_text import Fleet
 from gliderwatch.model import Alert, Assessment, Segment, SegmentId
+from gliderwatch.navigation.clock import moved
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
 from gliderwatch.sea.ocean_field import Field
@@ -46,12 +50,13 @@ def process_file(
     now: float,
     stopping: Callable[[], bool] = lambda: False,
     ocean: Field | None = None,
+    limits: Mapping[str, Limits] | None = None,
 ) -> FileOutcome:
     """Put a segment in its place and go on from the checkpoint before it; say what is to be said.
 
     A copy that holds no more than the one known is only noted. `speaking` is None while more files of the
     glider are at hand: then the last of them speaks for all. `now` (s) is when the file came; `ocean` is a
-    model's field, where dives are compared with one.
+    model's field, where dives are compared with one; `limits` are those of the rules of health.
     Raises Quarantine for a segment that cannot be assessed, StoppedError once `stopping` holds; then
     nothing has changed.
     """
@@ -66,6 +71,7 @@ def process_file(
         file = replace(file, status=Status.TAKEN, reason="")
         store.note(file, now)
         assessments = _run(store, segment, params, stopping, ocean)
+        _keep_readings(store, segment, limits)
         alerts = _due_messages(store, glider, params, speaking, now)
     return FileOutcome(file, assessments, alerts)
 
@@ -92,15 +98,19 @@ def take_log(
     params: GliderParams,
     speaking: Routing | None,
     now: float,
+    limits: Mapping[str, Limits] | None = None,
 ) -> FileOutcome:
     """Keep what the log of a call tells by `now` (s), and say what is to be said.
 
-    `dialog` is None where the log could not be read.
+    `dialog` is None where the log could not be read; `limits` are those of the rules of health.
     """
     with store.transaction():
         store.note(file, now)
         if dialog is not None:
             store.calls.keep(file.path, dialog.call, plain_encode(dialog), now)
+            call = dialog.call
+            if call.glider and limits != {}:
+                store.health.put(call.glider, file.path, call.last_t, of_call(call), limits or usual_limits())
         alerts = (
             _due_messages(store, file.glider, params, speaking, now) if file.status is Status.TAKEN else ()
         )
@@ -206,6 +216,14 @@ def _run(
         }
     segments.thin(segment.id.glider)
     return tuple(dives.values())
+
+
+def _keep_readings(store: Store, segment: Segment, limits: Mapping[str, Limits] | None) -> None:
+    """Keep what a segment tells of the glider's health, by a clock that is right; not where no rule is on."""
+    if limits != {}:
+        sent = moved(segment, store.segments.offset(segment.id))
+        readings = of_segment(sent)
+        store.health.put(sent.id.glider, sent.id.name, sent.last_t, readings, limits or usual_limits())
 
 
 def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: Field | None) -> Outcome:

@@ -113,7 +113,9 @@ def after(dialog: Dialog, event: Event) -> Dialog:
     match event:
         case logs.Clock():
             timed = _timed(dialog, event.t)
-            return timed if timed is dialog else replace(timed, call=with_readings(timed.call, event, event.t))
+            return (
+                timed if timed is dialog else replace(timed, call=with_readings(timed.call, event, event.t))
+            )
         case logs.Vehicle():
             return _named(dialog, event.name)
         case logs.PilotThere():

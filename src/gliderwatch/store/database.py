@@ -125,7 +125,7 @@ __all__ = [
     "schema",
 ]
 
-SCHEMA = 7
+SCHEMA = 8
 DELIVERY_BY_WORDS = """CASE
     WHEN delivered_at IS NULL THEN 'pending' WHEN error = '' THEN 'delivered'
     WHEN error LIKE 'withdrawn: %' THEN 'withdrawn' WHEN error LIKE 'given up: %' THEN 'unreadable'
@@ -246,6 +246,16 @@ CREATE TABLE calls (              -- what the log of each call has told
     dialog TEXT NOT NULL          -- how far it is read: `ingest.calls.Dialog`
 ) STRICT;
 CREATE INDEX calls_in_order ON calls (glider, last_t);
+""",
+    8: """
+CREATE TABLE health (             -- readings of each segment and call, and what the rules found in them
+    source   TEXT PRIMARY KEY,    -- name of a segment, or path of a log
+    glider   TEXT NOT NULL,
+    t        REAL NOT NULL,       -- its last reading, by the glider's clock
+    readings TEXT NOT NULL,
+    judged   TEXT NOT NULL        -- `health.rules.Judged`
+) STRICT;
+CREATE INDEX health_in_order ON health (glider, t);
 """,
 }
 """SQL that leads from the schema before to the one of the key. It may call the functions of

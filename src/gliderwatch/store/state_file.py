@@ -22,6 +22,7 @@ from gliderwatch.pipeline import Outcome
 from gliderwatch.store import codec, outbox, retention, segments
 from gliderwatch.store.codec import File, Status, Undelivered, file_of, values
 from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, read_only
+from gliderwatch.store.health import HealthRows
 from gliderwatch.store.results import Annotations, Calls, GliderFacts
 from gliderwatch.store.segments import RECENT, Segments
 
@@ -45,7 +46,7 @@ class Store:
     def __init__(self, connection: sqlite3.Connection, path: Path | str = MEMORY) -> None:
         self._db, self._path = connection, path
         self.segments, self.notes = Segments(connection), Annotations(connection)
-        self.calls = Calls(connection)
+        self.calls, self.health = Calls(connection), HealthRows(connection)
 
     @classmethod
     def open(cls, path: Path | str, *, durable: bool = True) -> Store:
