@@ -17,10 +17,8 @@ _DEGREE = float(np.radians(1))
 
 
 def _altitude(history: History, limits: Limits) -> Finding | None:
-    configured, target = limits["minimum"], history.get("altitude_target")
-    least = configured if configured is not None else float(target.v[-1]) if len(target) else None
-    factor = limits["factor"]
-    if least is None or least <= 0 or factor is None:
+    least, factor = limits["minimum"], limits["factor"]
+    if least is None or factor is None:
         return None
     low = run(history, "altitude", lambda v: v < factor * least)
     if low is None:
@@ -92,7 +90,7 @@ ALTITUDE = Rule(
     ("altitude",),
     _altitude,
     (
-        Limit("minimum", None, "m", 0.1, 1000, "The altitude at which it turns; null: as the glider says."),
+        Limit("minimum", None, "m", 0.1, 1000, "Below where it is meant to turn; null: the rule is off."),
         Limit("factor", 1.5, "", 1, 100, "Two readings in a row below so many times that are a warning."),
     ),
     "The height above the bottom.",

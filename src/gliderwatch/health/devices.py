@@ -87,7 +87,7 @@ def _memory(history: History, limits: Limits) -> Finding | None:
 
 
 def _calls(history: History, limits: Limits) -> Finding | None:
-    cut, most = history.get("call_cut"), limits["part"]
+    cut, most = history.earlier("call_cut"), limits["part"]  # the last call may go on
     if len(cut) < LAST_CALLS or most is None:
         return None
     part = float(np.mean(cut.v[-LAST_CALLS:]))

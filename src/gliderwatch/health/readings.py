@@ -31,7 +31,7 @@ Readings = Mapping[str, Series]
 LOWEST = ("leak_voltage", "leak_voltage_forward", "leak_voltage_science", "digifin_leak", "altitude")
 """Quantities of which low values are bad: of many readings the lowest count, but for single ones."""
 PLAIN = ("vacuum", "battery_voltage", "heap_free", "disk_free")
-LATEST = ("battery_charge", "charge_used", "mission_time", "altitude_target")
+LATEST = ("battery_charge", "charge_used", "mission_time")
 """Quantities of which the first and the last reading of a file are enough."""
 COMMANDED = {
     "battery_position": "battery_position_commanded",
@@ -124,7 +124,7 @@ def of_call(call: Call) -> Readings:
         _put(out, name, joined([_series([t], [v]) for t, v in pairs]))
     if call.fix is not None:
         _put(out, "fix_age", _series([call.last_t], [max(call.last_t - call.fix.t, 0.0)]))
-    if call.over:
+    if call.announced:
         _put(out, "call_cut", _series([call.last_t], [float(_is_cut(call))]))
     if "vacuum" in out:
         out |= _vacuum(out["vacuum"], out.pop("vehicle_temperature", EMPTY), EMPTY, call.last_t)

@@ -132,7 +132,6 @@ QUANTITIES = (
     _q("fin_commanded", "c_fin", "rad", -1.5, 1.5, "commanded angle of the fin"),
     _q("ballast_commanded", "c_ballast_pumped", "cc", -2e-3, 2e-3, "commanded volume of a shallow pump"),
     _q("oil_volume_commanded", "c_de_oil_vol", "cc", -2e-3, 2e-3, "commanded volume of a deep pump"),
-    _q("altitude_target", "x_current_target_altitude", "m", 0.1, 2000, "height at which it turns"),
     _q("mission_time", "m_present_secs_into_mission", "sec", 0, 1e8, "time since the mission began"),
     _q("heap_free", "m_free_heap", "bytes", 1, 1e9, "free memory of the flight computer"),
     _q("disk_free", "m_disk_free", "Mbytes", 1, 1e12, "free disk of the flight computer"),
