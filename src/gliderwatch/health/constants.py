@@ -46,6 +46,8 @@ each motor."""
 ATMOSPHERE = 101325.0
 """Pascal outside the hull when it was closed."""
 KELVIN = 273.15
+COOL = 288.0
+"""Kelvin at which a density of gas is shown as a vacuum."""
 INHG = 3386.389
 """Pascal in an inch of mercury."""
 TREND_WINDOWS = (2.5 * DAY, 5 * DAY, 10 * DAY)
@@ -54,8 +56,8 @@ TREND_FILES = 10
 """Least files for a trend."""
 TREND_SIGMA = 3.0
 """Standard errors beyond which the vacuum falls (checklists: look at the trend; three: one in a thousand)."""
-TREND_LEAST = 0.2 * INHG / (7 * DAY)
-"""Pascal a second that are spoken of at least: 0.2 inHg a week; slower is the ageing of seals."""
+TREND_LEAST = 0.25 * INHG / (7 * DAY)
+"""Pascal a second that are spoken of at least: 0.25 inHg a week; slower is the ageing of seals."""
 OFF_LINE = 0.05 * INHG
 """Pascal by which a vacuum is off any line at least: one step of the sensor."""
 

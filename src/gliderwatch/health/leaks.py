@@ -6,12 +6,15 @@ Limits: operators' checklists, abort files, and the ranges measured on five heal
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import ndtr, stdtrit
 
 from gliderwatch.health.constants import (
     ATMOSPHERE,
+    COOL,
     DAY,
     INHG,
     OFF_LINE,
+    ROBUST,
     TREND_FILES,
     TREND_LEAST,
     TREND_SIGMA,
@@ -20,7 +23,7 @@ from gliderwatch.health.constants import (
 )
 from gliderwatch.health.readings import History
 from gliderwatch.health.rule import Finding, Limit, Limits, Rule, found, loudest, run
-from gliderwatch.model import Array, Series, Severity
+from gliderwatch.model import Array, Series, Severity, readonly
 
 _WEEK = 7 * DAY
 
@@ -80,14 +83,14 @@ def _slow_leak(history: History, limits: Limits) -> Finding | None:
         series = history.get(name)
         if name not in history.fresh or least is None:
             continue
-        kelvin = 288.0
-        vacuum = Series(series.t, ATMOSPHERE - series.v * kelvin)  # as if always at this temperature
+        vacuum = Series(series.t, readonly(ATMOSPHERE - series.v * COOL))  # as if always at one temperature
         for window in TREND_WINDOWS:
             part = vacuum.between(float(vacuum.t[-1]) - window, np.inf)
-            if len(part) < TREND_FILES or part.t[-1] - part.t[0] < 0.6 * window:
+            if len(part) <= TREND_FILES or part.t[-1] - part.t[0] < 0.6 * window:
                 continue
-            slope, sigma = trend(part.t, part.v)
-            if slope < -least and slope < -TREND_SIGMA * sigma:
+            trends = [trend(part.t[:n], part.v[:n]) for n in range(len(part), len(part) - 3, -1)]
+            slope, sigma, _ = trends[0]
+            if all(s < -least and s < -x * e for s, e, x in trends):  # also without the last, and two
                 text = (
                     f"vacuum falls by {-slope * _WEEK / INHG:.2f} +- {sigma * _WEEK / INHG:.2f} inHg a week, "
                     "temperature accounted for"
@@ -96,11 +99,13 @@ def _slow_leak(history: History, limits: Limits) -> Finding | None:
     return None
 
 
-def trend(t: Array, v: Array) -> tuple[float, float]:
-    """Slope of a line through values ``v`` at times ``t`` (s), and its standard error (units a second).
+def trend(t: Array, v: Array) -> tuple[float, float, float]:
+    """Slope of a line through values ``v`` at times ``t`` (s), its standard error (units a second), and of
+    how many of these it has to be to be as sure as `TREND_SIGMA` of a normal one, looked for in all windows.
 
     Least squares after what is wild is drawn in (Huber, three standard deviations); the error is that of
-    residuals that follow each other: it grows with their correlation r by sqrt((1 + r) / (1 - r)).
+    residuals that follow each other: with their correlation r there are as many independent values as
+    n (1 - r) / (1 + r), and Student's t of those.
     """
     x = t - t.mean()
     weights = np.ones_like(v)
@@ -109,12 +114,15 @@ def trend(t: Array, v: Array) -> tuple[float, float]:
         spread_x = float(np.sum(weights * (x - mean_x) ** 2))
         slope = float(np.sum(weights * (x - mean_x) * (v - mean_v))) / spread_x
         rest = v - mean_v - slope * (x - mean_x)
-        scale = max(1.4826 * float(np.median(np.abs(rest))), OFF_LINE / 10)
+        scale = max(ROBUST * float(np.median(np.abs(rest))), OFF_LINE / 10)
         weights = np.minimum(1.0, 3.0 * scale / np.maximum(np.abs(rest), 1e-9))
     variance = max(float(np.sum(weights * rest**2)) / (len(v) - 2), (OFF_LINE / 5) ** 2)
     r = float(np.sum(rest[1:] * rest[:-1]) / max(float(np.sum(rest**2)), 1e-12))
-    r = min(max(r, 0.0), 0.9)
-    return slope, (variance / spread_x * (1 + r) / (1 - r)) ** 0.5
+    r = min(max(r + 1 / len(v), 0.0), 0.9)  # that of residuals of a line is too low by about 1 / n
+    independent = len(v) * (1 - r) / (1 + r)
+    chance = float(ndtr(-TREND_SIGMA)) / len(TREND_WINDOWS)
+    surely = -float(stdtrit(max(independent - 2, 1.0), chance))
+    return slope, (variance / spread_x * (1 + r) / (1 - r)) ** 0.5, surely
 
 
 LEAK = Rule(
