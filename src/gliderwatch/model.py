@@ -152,7 +152,8 @@ class Call:
     end of the connection is in the log, ``calls_back`` whether it said that it would. ``fix`` is the last
     position, ``waypoint`` (latitude, longitude, degrees) where it is bound; ``reason`` why it is up.
     ``announced`` are the names of files whose transfer began, ``sent`` of those whose transfer was done;
-    ``mission`` and ``segment`` what it named last as running, at ``mission_t`` (s). ``readings`` are the last
+    ``mission`` and ``segment`` (its 8.3 name ``short``) what it named last as running, at ``mission_t`` (s).
+    ``readings`` are the last
     ones of each quantity that rules of health look at.
     """
 
@@ -168,6 +169,7 @@ class Call:
     mission: str = ""
     mission_t: float | None = None
     segment: str = ""
+    short: str = ""
     announced: tuple[str, ...] = ()
     sent: tuple[str, ...] = ()
     aborts: tuple[Aborts, ...] = ()

@@ -133,7 +133,8 @@ def _told(call: Call, event: Event, t: float) -> Call:
         case logs.HangUp():
             call = replace(call, calls_back=call.calls_back or event.minutes is not None)
         case logs.Mission():
-            call = replace(call, mission=event.name, mission_t=t, segment=event.segment)
+            short = event.short.replace(".", "")
+            call = replace(call, mission=event.name, mission_t=t, segment=event.segment, short=short)
         case logs.Because():
             call = replace(call, reason=event.reason)
         case logs.Waypoint():
