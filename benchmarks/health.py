@@ -2,8 +2,8 @@
 
     python benchmarks/health.py [--seeds 10] [--months 10]
 
-Each fault begins on a glider of its own for each seed, with dropped calls, calls without a file, garbled lines
-and pilots who type. Its files and logs go through a replay. Counted are the messages about it, and the
+Each fault begins on a glider of its own for each seed, with dropped calls, calls without a file, garbled
+lines and pilots who type. Its files and logs go through a replay. Counted are the messages about it, and the
 surfacings from its onset to the first of them. Healthy gliders fly for 30 days each.
 """
 
@@ -112,13 +112,12 @@ def faults(name: str, fault: Fault, seeds: int) -> None:
         if told:
             hours.append((told[0].time - onset) / 3600)
             surfacings.append(sum(onset < t <= told[0].time for t, _ in calls))
-    at, late = (f"{median(hours):.1f}", f"{max(hours):.1f}") if hours else ("-", "-")
-    more = f"; also {dict(others)}" if others else ""
-    print(
-        f"{name}: {sum(n == 1 for n in counts)} of {seeds} reported once, {sum(n == 0 for n in counts)} missed; "
-        f"surfacings until then {dict(sorted(Counter(surfacings).items()))}, hours: median {at}, most {late}{more}",
-        flush=True,
-    )
+    once, missed = sum(n == 1 for n in counts), sum(n == 0 for n in counts)
+    print(f"{name}: {once} of {seeds} reported once, {missed} missed; surfacings until then", end=" ")
+    print(dict(sorted(Counter(surfacings).items())), end="")
+    if hours:
+        print(f", hours: median {median(hours):.1f}, most {max(hours):.1f}", end="")
+    print(f"; also {dict(others)}" if others else "", flush=True)
 
 
 def healthy(months: int) -> None:
@@ -131,7 +130,8 @@ def healthy(months: int) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    shape = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=shape)
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--months", type=int, default=10)
     given = parser.parse_args()

@@ -134,7 +134,7 @@ def test_calls_that_are_cut() -> None:
 
 class TestSlowLeak:
     def rows(self, rate: float, days: float = 6.0, seed: int = 0) -> History:
-        """One density a file, eight a day; the vacuum falls at a rate (inHg a week), as the noise of george."""
+        """One density a file, eight a day; the vacuum falls at a rate (inHg a week)."""
         rng = np.random.default_rng(seed)
         t = np.arange(0, days * DAY, DAY / 8)
         vacuum = (8.0 - rate * t / (7 * DAY) + 0.05 * rng.standard_normal(len(t))) * INHG

@@ -1,4 +1,4 @@
-"""Findings of the rules of health in a row become incidents, by the table of all incidents; the notices. Pure.
+"""Findings of the rules of health become incidents, by the table of all incidents; the notices due. Pure.
 
 What is so follows from the readings, whatever their order of arrival. Notices are the difference between that
 and what people have been notified of, as for all incidents.
@@ -109,8 +109,8 @@ def announce(
     matched = _matched(before, incidents)
     threads, notices = list[HealthThread](), list[Notice]()
     for thread in before:
-        thread, more = _continued(thread, matched.get(thread.id), now)
-        threads.append(thread)
+        after, more = _continued(thread, matched.get(thread.id), now)
+        threads.append(after)
         notices += more
     old, taken = {i.id for i in matched.values()}, {t.id for t in threads}
     for incident in incidents:

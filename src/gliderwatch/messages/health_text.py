@@ -22,7 +22,7 @@ _BLOCKS = "▁▂▃▄▅▆▇█"
 _CHECKS = {
     "leak": ("the log: does it abort? A leak in the science bay leaves time, one in the pump does not",),
     "slow_leak": ("the vacuum of the last weeks, at depth alone", "where it can be recovered, and how soon"),
-    "battery_end": ("who switched something on: thruster, science, calls", "move the recovery, or save power"),
+    "battery_end": ("what was switched on: thruster, science, calls", "move the recovery, or save power"),
     "devices": ("the listing of devices in the log (`use`)", "does the device answer to a `put ... 1`?"),
     "altitude": ("the altimeter, and the depth of the water there", "`u_alt_min_depth`, the depth of the yo"),
     "roll": ("a lost wing or a load: speed and steering",),
