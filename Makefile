@@ -19,10 +19,10 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 WHEELHOUSE := dist/wheelhouse
 
 .DEFAULT_GOAL := help
-.PHONY: help install test chaos demo lint format types contracts docs audit sbom wheelhouse lock clean
+.PHONY: help install test test-all chaos demo lint format types contracts docs audit sbom wheelhouse lock clean
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
 # The locked packages, then the project itself in place: a second run finds both stamps and does nothing.
 $(VENV)/locked: requirements-dev.lock
@@ -37,11 +37,22 @@ $(VENV)/installed: $(VENV)/locked pyproject.toml
 
 install: $(VENV)/installed ## install gliderwatch and its tools into .venv, from the lock
 
-test: $(VENV)/installed ## run all tests; those that measure time first and alone
-	@mkdir -p build; rm -f build/tests-*.xml; failed=0; \
-	$(BIN)/python -m pytest -m timing --junit-xml=build/tests-timing.xml || [ $$? -eq 5 ] || failed=1; \
-	$(BIN)/python -m pytest -m "not timing" -n $(JOBS) --dist worksteal --junit-xml=build/tests-main.xml || failed=1; \
-	exit $$failed
+# Hundreds of tests start the service: its modules are compiled once, whatever the environment says.
+test test-all: export PYTHONDONTWRITEBYTECODE =
+test: SLOW := and not slow
+
+test: $(VENV)/installed ## run the tests, in some 6 minutes on 2 cores; those that measure time first and alone
+	$(PYTEST)
+
+test-all: $(VENV)/installed ## the same, and those marked `slow`: the long versions of what the others test too
+	$(PYTEST)
+
+define PYTEST
+@mkdir -p build; rm -f build/tests-*.xml; failed=0; \
+$(BIN)/python -m pytest -m "timing $(SLOW)" --junit-xml=build/tests-timing.xml || [ $$? -eq 5 ] || failed=1; \
+$(BIN)/python -m pytest -m "not timing $(SLOW)" -n $(JOBS) --dist worksteal --junit-xml=build/tests-main.xml || failed=1; \
+exit $$failed
+endef
 
 chaos: $(VENV)/installed ## half an hour of faults at random moments, then a comparison with an undisturbed replay
 	$(BIN)/python benchmarks/chaos.py --minutes $(MINUTES) --seed $(SEED)

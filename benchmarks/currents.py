@@ -24,7 +24,7 @@ from gliderwatch.model import Array, Dive, readonly
 from gliderwatch.papers import two_stage
 from gliderwatch.papers.two_stage import TwoStageParams
 from gliderwatch.sea import flow_forecast
-from gliderwatch.sea.flow_forecast import Currents, Parameters, displacement, forecasts, learn, predict
+from gliderwatch.sea.flow_forecast import Currents, Parameters, forecasts, learn, predict
 from gliderwatch.sea.tides import Constituent
 from gliderwatch.simulate import ocean
 from gliderwatch.simulate.delivery import write_mission
@@ -74,7 +74,7 @@ class Seen:
 @dataclass(frozen=True)
 class Row:
     """One dive: error (m/s, (2,)) of each forecast, the chosen one's source, its error squared in standard
-    errors; of the displacement over the dive the error of persistence and of `displacement` (m, as over 3 h)
+    errors; of the displacement over the dive the error of persistence and of the forecast (m, as over 3 h)
     and that squared in standard errors."""
 
     errors: dict[str, Array]
@@ -151,17 +151,16 @@ def rows(dives: Sequence[Seen]) -> tuple[list[Row], float]:
     for each in dives:
         told = {name: forecast(each) for name, forecast in others.items()}
         found, best = forecasts(state, each.start, each.end), predict(state, each.start, each.end)
-        moved = displacement(state, each.start, each.end)
-        if found is not None and best is not None and moved is not None:
+        if found is not None and best is not None:
             told |= {name: mixture.mean for name, mixture in found.items()} | {"chosen": best.flow}
-            out.append(row(each, told, best.source, best.cov, moved.x, moved.cov))
+            out.append(row(each, told, best.source, best.flow, best.cov))
         begun = time.process_time()
         state = learn(state, each.start, each.end, each.current, each.sigma)
         cost += time.process_time() - begun
     return out, cost / max(len(dives), 1)
 
 
-def row(each: Seen, told: dict[str, Array | None], source: str, cov: Array, x: Array, x_cov: Array) -> Row:
+def row(each: Seen, told: dict[str, Array | None], source: str, flow: Array, cov: Array) -> Row:
     lasts = each.end - each.start
     miss = {name: each.current - mean for name, mean in told.items() if mean is not None}
     e = miss["chosen"]
@@ -169,10 +168,10 @@ def row(each: Seen, told: dict[str, Array | None], source: str, cov: Array, x: A
     # where the truth is not known the reported current stands for it, with its error
     water = each.truth if each.truth is not None else each.current
     noise = 0.0 if each.truth is not None else each.sigma
-    off = x - water * lasts
+    off = (flow - water) * lasts
     last = told["persistence"]
     assert last is not None
-    spread = float(off @ np.linalg.solve(x_cov + (noise * lasts) ** 2 * np.eye(2), off))
+    spread = float(off @ np.linalg.solve((cov + noise**2 * np.eye(2)) * lasts**2, off))
     scale = 3 * HOUR / lasts
     metres = (float(np.hypot(*(last - water))) * 3 * HOUR, float(np.hypot(*off)) * scale)
     return Row(miss, source, nis, metres, spread)

@@ -134,7 +134,8 @@ def flight(job: Job) -> Flight:
 def _sources() -> str:
     """A hash of all that makes the segments: the simulator, the decoder and the shape of a segment."""
     root, digest = Path(gliderwatch.__file__).parent, hashlib.sha256()
-    for path in (*sorted((root / "simulate").glob("*.py")), *sorted((root / "ingest").glob("*.py"))):
+    made_by = (root / "slocum" / f"{name}.py" for name in ("cycles", "decode", "header", "sensors"))
+    for path in (*sorted((root / "simulate").glob("*.py")), *made_by, root / "model.py"):
         digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()
 

@@ -172,11 +172,12 @@ def tables(results: Sequence[Result]) -> tuple[list[Healthy], list[Faulty]]:
     well, ill = [], []
     for sea in (*seas, "all"):
         mine = [r for r in results if sea in (r.sea, "all")]
-        well.append(healthy(sea, [r for r in mine if r.fault == HEALTHY]))
+        if sound := [r for r in mine if r.fault == HEALTHY]:
+            well.append(healthy(sea, sound))
         ill += [
             faulty(sea, fault, found) for fault in FAULTS if (found := [r for r in mine if r.fault == fault])
         ]
-    return [row for row in well if row.months], ill
+    return well, ill
 
 
 def shown(well: Sequence[Healthy], ill: Sequence[Faulty]) -> Iterator[str]:
@@ -218,13 +219,13 @@ def told(results: Iterable[Result]) -> Iterator[str]:
 
 def jobs(arguments: argparse.Namespace) -> list[Job]:
     """All gliders of a run: of the quick one a fault befalls one seed, in turn."""
-    seeds, found = arguments.seeds or (2 if arguments.quick else 6), []
+    seeds, first, found = arguments.seeds or (2 if arguments.quick else 6), arguments.first, []
     for i, sea in enumerate(arguments.seas or SEAS):
         for seed in range(seeds):
-            found.append(Job(sea, seed, HEALTHY, arguments.days, arguments.kept))
+            found.append(Job(sea, first + seed, HEALTHY, arguments.days, arguments.kept))
         for j, fault in enumerate(FAULTS):
             befallen = [(i + j) % seeds] if arguments.quick else range(seeds)
-            found += [Job(sea, seed, fault, arguments.days, arguments.kept) for seed in befallen]
+            found += [Job(sea, first + seed, fault, arguments.days, arguments.kept) for seed in befallen]
     wanted = arguments.only
     return [job for job in found if wanted is None or job.fault in wanted]
 
@@ -235,6 +236,7 @@ def main() -> None:
     parser.add_argument("--seas", nargs="*", choices=list(SEAS), help="these kinds of sea alone")
     parser.add_argument("--only", nargs="*", choices=[HEALTHY, *FAULTS], help="these faults alone")
     parser.add_argument("--seeds", type=int, help="gliders a sea (6; quick: 2)")
+    parser.add_argument("--first", type=int, default=0, help="first seed: others than were calibrated with")
     parser.add_argument("--days", type=float, default=30.0, help="of healthy gliders")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--direct", action="store_true", help="write no checkpoints: half of the time")

@@ -25,8 +25,7 @@ import numpy as np
 from common import machine
 from flights import read
 
-from gliderwatch.model import Assessment, Kind, Segment
-from gliderwatch.navigation.dives import NOT_SURFACED
+from gliderwatch.model import Assessment, Kind, Segment, Unusable
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, process
 from gliderwatch.score.graft import Graft, GraftKind, grafted, navigate, own_speeds
@@ -49,7 +48,7 @@ class Told:
 
     def ended(self) -> list[Assessment]:
         """The dives that have ended, in order."""
-        return [a for t, a in sorted(self.dives.items()) if a.reason != NOT_SURFACED]
+        return [a for t, a in sorted(self.dives.items()) if a.unusable is not Unusable.NOT_SURFACED]
 
 
 @dataclass(frozen=True)

@@ -21,43 +21,43 @@ Schema = dict[str, Any]
 INTRO = """\
 # Configuration
 
-One YAML file; `config/gliderwatch.yml` is a commented one to copy. Ask `gliderwatch check -c FILE`
-before you start: it names the line of everything that is wrong, and looks at the folders, caches
-and channels too. An editor that knows JSON Schema completes and checks it with
+One YAML file; copy `config/gliderwatch.yml`, which has comments. Before you start,
+`gliderwatch check -c FILE` names the line of each mistake, and checks the folders, caches
+and channels too. An editor with JSON Schema completes and checks the file with
 `gliderwatch.schema.json` of this folder.
 
-*This page is made by `docs/generate.py`.*
+*`docs/generate.py` makes this page.*
 
 ## Which value counts
 
-For each glider, a later one wins, key by key:
+For each glider and key, the last of these counts:
 
 1. the built-in default (the tables below),
 2. the preset that the glider names, else the one that `defaults` names,
 3. `defaults`,
 4. the glider's own section under `gliders`.
 
-A key that is given as `null` counts as given, where `null` has a meaning.
+`null` counts as a value where it has a meaning.
 
 ## Names and paths
 
-Gliders are matched by the name in the headers of their files, in lower case. A glider that is not
-under `gliders` is listed by `check` and `status`, and not watched. Relative paths start at the folder of
-the configuration file. Patterns know `*`, `?` and `[...]`; they are looked up again at each rescan.
+A glider's name is that in the headers of its files, in lower case. `check` and `status` list gliders that are
+not under `gliders`; they are not watched. Relative paths start at the folder of
+the configuration file. Patterns may have `*`, `?` and `[...]`; each rescan evaluates them again.
 
 ## Secrets
 
-A channel's URL, or any part of it, can come from outside of the file:
+A channel's URL, or any part of it, can come from elsewhere:
 
-| written | taken from |
+| written | comes from |
 | --- | --- |
 | `${NAME}` | environment variable |
 | `${file:PATH}` | text of a file, one line |
 | `${credential:NAME}` | systemd credential (`LoadCredential=NAME:PATH` of the service) |
-| `url: {file: PATH}` | a file with the whole URL |
+| `url: {file: PATH}` | a file with the complete URL |
 
 A value before the `@` of the address (`user:${PASSWORD}@host`) or after its `?` is percent-encoded
-for you: store passwords as they are. Elsewhere it is put in as it is, so that it may be a whole URL or
+for you: store passwords as they are. Elsewhere it is not encoded, so that it may be a complete URL or
 a path of tokens. Values are never printed.
 """
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from alert_support import SLOW
 from gliderwatch.incidents.notifications import NotificationState, due_notifications
 from gliderwatch.incidents.state_machine import RuleStates, advance
+from gliderwatch.messages.notice_text import render
 from gliderwatch.model import Alert, Assessment, Incident, NextSurfacing
 from gliderwatch.params import RuleParams
 
@@ -71,5 +72,5 @@ class Talk:
         """The kinds of the messages that a world leads to now."""
         known = World.of(world) if isinstance(world, str) else world
         self.said, new = due_notifications(self.said, known, self.reminder_hours, self.notices)
-        self.alerts += new
+        self.alerts += map(render, new)
         return [str(a.kind) for a in new]

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from alert_support import HEALTHY
+from gliderwatch.incidents.notices import Fleet
 from gliderwatch.incidents.overdue import Sign, Silence, next_tick, tick
-from gliderwatch.messages.overdue_text import Fleet
+from gliderwatch.messages.notice_text import render
 from gliderwatch.model import Alert, Assessment, Incident, NextSurfacing
 
 HOUR = 3600.0
@@ -76,7 +77,7 @@ class Clock:
     def at(self, now: float, fleet: Fleet = Fleet()) -> list[str]:  # noqa: B008
         """The kinds of the messages of one tick."""
         self.silences, new = tick(self.silences, self.sea, fleet, self.hours, now)
-        self.alerts += new
+        self.alerts += map(render, new)
         return [str(a.kind) for a in new]
 
     def exactly(self, until: float, now: float) -> None:

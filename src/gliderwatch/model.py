@@ -377,9 +377,11 @@ class Kind(StrEnum):
     CORRECTION = "correction"
     OVERDUE = "overdue"
     UNKNOWN = "unknown"
+    REGIME = "regime"
     SURFACING = "surfacing"
     ABORT = "abort"
     CALL = "call"
+    HEALTH = "health"
     OPERATOR = "operator"
 
 

@@ -18,11 +18,13 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from aiosmtpd.controller import Controller
 
+from acceptance import warm
 from gliderwatch.model import Assessment, Incident
 from gliderwatch.simulate.delivery import deliver, write_cache
 from gliderwatch.simulate.glider import simulate
@@ -46,10 +48,15 @@ def until(condition: Callable[[], object], what: str, patience: float = PATIENCE
 def command(
     *arguments: object, cwd: Path | None = None, timeout: float = 120.0, **env: str
 ) -> subprocess.CompletedProcess[str]:
-    """Run the installed command and wait for its end."""
+    """Run a command in a process of its own that is ready for it, and wait for its end."""
+    words = [str(GLIDERWATCH), *map(str, arguments)]
+    return warm.run(words, os.environ | env, cwd or Path.cwd(), timeout)
+
+
+def installed(*arguments: object, timeout: float = 120.0, **env: str) -> subprocess.CompletedProcess[str]:
+    """The same by the installed program, from the start of Python on."""
     return subprocess.run(
         [str(GLIDERWATCH), *map(str, arguments)],
-        cwd=cwd,
         env=os.environ | env,
         capture_output=True,
         text=True,
@@ -66,6 +73,7 @@ def lines(path: Path) -> list[dict[str, Any]]:
 # --------------------------------------------------------------------------- missions
 
 
+@cache
 def remora(days: float = 3.0, *, onset: float = 1.5, seed: int = 4, glider: str = "bruce") -> Mission:
     """A mission on which a remora takes hold of the glider: it has an incident."""
     start = Scenario().start
@@ -73,6 +81,7 @@ def remora(days: float = 3.0, *, onset: float = 1.5, seed: int = 4, glider: str 
     return simulate(Scenario(seed=seed, glider=glider, days=days, faults=(fault,)))
 
 
+@cache
 def healthy(days: float = 1.0, *, seed: int = 11, glider: str = "angus") -> Mission:
     """A mission without a fault."""
     return simulate(Scenario(seed=seed, glider=glider, days=days))

@@ -7,6 +7,8 @@ import shutil
 from contextlib import closing
 from pathlib import Path
 
+import pytest
+
 import dinkum
 from acceptance.angus import FILES, MISSION, put, taken
 from acceptance.support import Daemon, Site, command, until
@@ -117,6 +119,7 @@ def test_the_science_file_that_comes_after_its_flight_file_gives_the_depth(site:
         assert len(daemon.log("file taken")) == 2
 
 
+@pytest.mark.slow
 def test_a_science_file_that_came_while_nobody_watched_gives_the_depth(site: Site) -> None:
     site.configure("unit_7")
     site.cache.joinpath(f"{dinkum.CRC}.cac").write_bytes(dinkum.sensor_list(NO_DEPTH))

@@ -28,7 +28,7 @@ def begin(site: Site, glider: str) -> Path:
     return path
 
 
-@pytest.mark.parametrize("observer", ["inotify", "polling"])
+@pytest.mark.parametrize("observer", ["inotify", pytest.param("polling", marks=pytest.mark.slow)])
 def test_abort_is_mailed_while_the_call_is_on(tmp_path: Path, observer: str) -> None:
     gliders = [f"g{k}" for k in range(5)]
     site, waits = Site(tmp_path), []

@@ -17,6 +17,7 @@ from acceptance.support import (
     Site,
     command,
     healthy,
+    installed,
     mail_server,
     until,
 )
@@ -64,6 +65,24 @@ def test_wrong_arguments_are_told_in_a_line_and_end_with_2(
     assert told in result.stderr.strip().splitlines()[-1]
     assert TRACEBACK not in result.stderr
     assert not result.stdout
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--version"],
+        ["check", "-h"],
+        ["status", "-c", "nowhere.yml"],
+        ["test-alert", "-c", "gliderwatch.yml"],
+    ],
+)
+def test_commands_of_these_tests_do_what_the_installed_program_does(
+    site: Site, arguments: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(site.configure("angus", url="json://127.0.0.1:9/${SECRET}").parent)
+    one, other = command(*arguments, SECRET=PASSWORD), installed(*arguments, SECRET=PASSWORD)
+    assert (one.returncode, one.stdout, one.stderr) == (other.returncode, other.stdout, other.stderr)
+    assert one.stdout + one.stderr
 
 
 @pytest.mark.parametrize("option", [["--cache", "."], ["--glider", "electa"], ["--out", "out"], ["--send"]])

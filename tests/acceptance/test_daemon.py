@@ -149,6 +149,7 @@ def test_sighup_with_a_bad_configuration_is_refused(site: Site, old: str, new: s
         assert TRACEBACK not in daemon.text()
 
 
+@pytest.mark.slow
 def test_sighup_in_the_middle_of_a_backlog_loses_nothing(site: Site, tmp_path: Path) -> None:
     files = plenty(site)
     with Daemon(site) as daemon:
@@ -207,6 +208,7 @@ def test_the_service_manager_is_told(site: Site, tmp_path: Path) -> None:
     assert told[0] == "READY=1"
 
 
+@pytest.mark.slow
 def test_the_watchdog_is_served_while_there_is_much_to_do(site: Site, tmp_path: Path) -> None:
     files = plenty(site)
     with (

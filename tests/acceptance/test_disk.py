@@ -60,7 +60,7 @@ def check(site: Site, box: Mailbox, daemon: Daemon) -> None:
     assert results(site.state) == results(out / "replay.sqlite")
 
 
-@pytest.mark.parametrize("limited", [False, True])
+@pytest.mark.parametrize("limited", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_full_disk_is_said_and_when_there_is_room_all_is_taken(site: Site, limited: bool) -> None:
     with mail_server() as box, disk(site, limited=limited) as small:
         site.configure("angus", url=box.url, surfacing=["angus"])
@@ -83,6 +83,7 @@ def test_a_full_disk_is_said_and_when_there_is_room_all_is_taken(site: Site, lim
         assert "What to do: " in told(daemon) and cure in told(daemon)
 
 
+@pytest.mark.slow
 def test_a_state_that_becomes_read_only_is_said_and_no_sign_of_life_given(site: Site) -> None:
     switch = site.config.with_name("switch")
     with mail_server() as box:

@@ -9,6 +9,8 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 from acceptance.angus import FILES, SHORT, put, taken
 from acceptance.support import (
     Daemon,
@@ -242,6 +244,7 @@ def test_garbage_is_quarantined_and_the_next_file_goes_on(site: Site, daemon: Da
         assert (folder / name).exists()
 
 
+@pytest.mark.slow
 def test_damaged_files_never_end_it(site: Site, daemon: Daemon) -> None:
     """Every file of a mission with some bytes changed at seeded places."""
     whole = b"".join(file.data for file in FILES)
@@ -303,6 +306,7 @@ def test_nothing_below_the_root_changes(site: Site) -> None:
     assert sorted(path.name for path in site.cache.iterdir()) == cache
 
 
+@pytest.mark.slow
 def test_a_glider_whose_folder_is_a_link_is_named_in_status_and_its_cure_works(
     site: Site, tmp_path: Path
 ) -> None:

@@ -35,6 +35,7 @@ def site_of_two(site: Site) -> Site:
     return site
 
 
+@pytest.mark.slow
 def test_hundreds_of_hostile_files_are_named_and_good_ones_are_taken(site_of_two: Site) -> None:
     site = site_of_two
     names = fill(site.folder("angus"), [file.data for file in FILES], N, seed=1)

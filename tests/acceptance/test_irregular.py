@@ -10,7 +10,9 @@ from clocks import WEEKS
 DAY = 86400.0
 
 
-@pytest.mark.parametrize(("seconds", "size"), [(WEEKS, "1024 weeks"), (10 * DAY, "10 days")])
+@pytest.mark.parametrize(
+    ("seconds", "size"), [(WEEKS, "1024 weeks"), pytest.param(10 * DAY, "10 days", marks=pytest.mark.slow)]
+)
 def test_a_clock_that_falls_back_is_told_and_costs_nothing(tmp_path: Path, seconds: float, size: str) -> None:
     case = clock_fallen(seconds)
     found = said(case, tmp_path)
@@ -24,6 +26,7 @@ def test_a_clock_that_falls_back_is_told_and_costs_nothing(tmp_path: Path, secon
     assert any("behind" in note for note in glider["latest"]["notes"])
 
 
+@pytest.mark.slow
 def test_names_that_are_used_twice_are_two_segments(tmp_path: Path) -> None:
     case = names_twice()
     found = said(case, tmp_path)

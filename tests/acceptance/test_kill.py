@@ -110,7 +110,7 @@ def check(site: Site, box: Mailbox, files: list[Sent], seed: int) -> None:
     assert results(site.state) == expected
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_simulated_mission_in_any_order_with_kills_ends_as_a_replay_does(tmp_path: Path, seed: int) -> None:
     site = Site(tmp_path)
     site.caches(remora(3.0))
@@ -136,6 +136,7 @@ def test_a_real_mission_in_any_order_with_kills_ends_as_a_replay_does(
     assert results(site.state)["electa"][1], "no incident: a test of little"
 
 
+@pytest.mark.slow
 def test_kills_at_commit_points_and_at_random_lose_nothing(tmp_path: Path) -> None:
     """`benchmarks/chaos.py` does the same with hundreds of kills, and all other faults beside them."""
     site, missions = Site(tmp_path), fleet(3.0)

@@ -98,7 +98,7 @@ def test_incidents_are_listed_and_taken_on(site: Site) -> None:
         assert TRACEBACK not in daemon.text()
 
 
-@pytest.mark.parametrize("taken_on", [True, False])
+@pytest.mark.parametrize("taken_on", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_nobody_is_reminded_of_what_somebody_took_on(site: Site, taken_on: bool) -> None:
     with mail_server() as box:
         site.configure(
@@ -136,6 +136,7 @@ def test_a_mute_is_heeded_by_the_running_service_and_ends_with_unmute(site: Site
             assert site.status()["gliders"]["bruce"]["muted_until"] is None
 
 
+@pytest.mark.slow
 def test_what_is_open_is_told_when_a_mute_ends_by_itself(site: Site) -> None:
     with mail_server() as box:
         site.configure("bruce", url=box.url)
@@ -147,6 +148,7 @@ def test_what_is_open_is_told_when_a_mute_ends_by_itself(site: Site) -> None:
     assert subjects(box)[0] == "ANOMALY"
 
 
+@pytest.mark.slow
 def test_a_mute_outlives_a_restart_and_a_replay_knows_nothing_of_it(site: Site, tmp_path: Path) -> None:
     with Daemon(site):
         until(site.state.exists, "a state")

@@ -192,6 +192,7 @@ def test_a_score_that_is_stopped_says_so_without_a_traceback(tmp_path: Path) -> 
     assert TRACEBACK not in said and "KeyboardInterrupt" not in said, said
 
 
+@pytest.mark.slow
 def test_a_demo_that_is_stopped_says_so_and_leaves_nothing(tmp_path: Path) -> None:
     demo = ROOT / "demo" / "demo.py"
     begun = tmp_path / "gliderwatch-demo-*"

@@ -136,6 +136,7 @@ def workers(pid: int) -> Iterator[int]:
                 yield child
 
 
+@pytest.mark.slow
 def test_signs_of_life_stop_while_the_decoder_is_stuck(site: Site, tmp_path: Path) -> None:
     sign = tmp_path / "sign"
     configure(site, heartbeat={"file": str(sign), "minutes": 0.001})

@@ -102,6 +102,7 @@ def test_it_is_told_when_due_once_and_clears_itself(site: Site, tmp_path: Path) 
     assert len(box.times()) == 3
 
 
+@pytest.mark.slow
 def test_files_that_come_at_once_are_told_once_whatever_their_order(site: Site, tmp_path: Path) -> None:
     """The newest comes first: alone it would tell of a call that was late, with the next of one in time."""
     flight = fly(tmp_path, time.time() + 12.0)
@@ -123,6 +124,7 @@ def test_files_that_come_at_once_are_told_once_whatever_their_order(site: Site, 
     assert len(told) == 2 and told[1].startswith(f"CORRECTION {GLIDER}: it was up in time"), told
 
 
+@pytest.mark.slow
 def test_an_archive_a_mute_and_a_recovery_are_quiet(site: Site, tmp_path: Path) -> None:
     """What would be told without them is told in the end."""
     flight = fly(tmp_path, time.time() - 1.0)

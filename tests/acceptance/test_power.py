@@ -38,6 +38,7 @@ def copied(state: Path, folder: Path) -> Path:
     return folder / state.name
 
 
+@pytest.mark.slow
 def test_a_copy_of_any_moment_opens_is_whole_and_goes_on(site: Site, tmp_path: Path) -> None:
     copies = []
     with Daemon(site) as daemon:
@@ -94,7 +95,10 @@ def bruce(tmp_path: Path) -> Site:
     return site
 
 
-@pytest.mark.parametrize("harm", [overwritten, truncated, zeroed, emptied])
+@pytest.mark.parametrize(
+    "harm",
+    [overwritten, *(pytest.param(harm, marks=pytest.mark.slow) for harm in (truncated, zeroed, emptied))],
+)
 def test_damage_is_set_aside_and_made_good_from_the_files(bruce: Site, harm: Callable[[Path], None]) -> None:
     site, files = bruce, list(arrivals(remora(3.0)))
     with mail_server() as box:
@@ -123,6 +127,7 @@ def test_damage_is_set_aside_and_made_good_from_the_files(bruce: Site, harm: Cal
     assert box.times().keys() - before.keys() == {told[0].id}
 
 
+@pytest.mark.slow
 def test_damage_found_while_it_runs_ends_it_in_words_and_the_next_start_makes_it_good(site: Site) -> None:
     """A checkpoint that no check of SQLite can see: pages are right, the record in one is not."""
     early, late = FILES[:4], FILES[4:]
@@ -172,6 +177,7 @@ def test_a_record_of_a_type_that_is_not_known_is_no_damage_and_sets_nothing_asid
     assert TRACEBACK not in daemon.text()
 
 
+@pytest.mark.slow
 def test_a_message_that_waited_in_a_damaged_file_is_sent(bruce: Site) -> None:
     site, files = bruce, list(arrivals(remora(3.0)))
     with mail_server() as box:

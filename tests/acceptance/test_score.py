@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
-from acceptance.support import TRACEBACK, command
+from acceptance.support import TRACEBACK, command, installed
 
 THRESHOLDS = Path(__file__).parents[1] / "golden" / "score.yml"
 
@@ -17,7 +17,7 @@ THRESHOLDS = Path(__file__).parents[1] / "golden" / "score.yml"
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("score")
-    done = command("score", "--grid", "small", "--out", out)
+    done = installed("score", "--grid", "small", "--out", out)
     assert done.returncode == 0, done.stderr
     assert "joint: faults of simulated gliders" in done.stdout
     return out
@@ -28,6 +28,7 @@ def found(small: Path) -> dict[str, Any]:
     return json.loads((small / "score.json").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_nothing_that_was_detected_is_lost(found: dict[str, Any]) -> None:
     limits = YAML(typ="safe").load(THRESHOLDS)
     by_fault = {score["fault"]: score for score in found["faults"] if score["sea"] == ""}
@@ -41,6 +42,7 @@ def test_nothing_that_was_detected_is_lost(found: dict[str, Any]) -> None:
     assert max(healthy) <= limits["most_rms_healthy"]
 
 
+@pytest.mark.slow
 def test_what_is_done_is_not_run_again(small: Path) -> None:
     before = {path: path.stat().st_mtime_ns for path in (small / "cells").iterdir()}
     (small / "score.json").unlink()
@@ -49,6 +51,7 @@ def test_what_is_done_is_not_run_again(small: Path) -> None:
     assert (small / "score.json").exists()
 
 
+@pytest.mark.slow
 def test_the_page_needs_nothing_else(small: Path) -> None:
     page = (small / "score.html").read_text(encoding="utf-8")
     assert page.count("<svg") == 3

@@ -49,7 +49,13 @@ def replayed(site: Site, name: str, **env: str) -> tuple[list[dict[str, object]]
     return lines(out / "assessments.jsonl"), lines(out / "alerts.jsonl")
 
 
-@pytest.mark.parametrize("start", [WINTER, LEAP], ids=["end of summer time", "leap day"])
+@pytest.mark.parametrize(
+    "start",
+    [
+        pytest.param(WINTER, id="end of summer time"),
+        pytest.param(LEAP, id="leap day", marks=pytest.mark.slow),
+    ],
+)
 def test_the_time_zone_of_the_host_does_not_matter(tmp_path: Path, start: float) -> None:
     site = site_of(tmp_path, mission(start))
     plain = replayed(site, "utc", TZ="UTC")
@@ -61,6 +67,7 @@ def test_the_time_zone_of_the_host_does_not_matter(tmp_path: Path, start: float)
     assert flown == sorted(flown)
 
 
+@pytest.mark.slow
 def test_files_of_1970_are_named_and_files_dated_in_the_future_are_taken(tmp_path: Path) -> None:
     """The clock of a glider that was not set: no order can be made of its files, the others go on."""
     flown, lost = mission(LEAP), list(arrivals(mission(YEAR_1970, 0.5)))
@@ -87,6 +94,7 @@ def test_files_of_1970_are_named_and_files_dated_in_the_future_are_taken(tmp_pat
     assert TRACEBACK not in daemon.text()
 
 
+@pytest.mark.slow
 def test_a_glider_clock_48_minutes_off_changes_times_only(tmp_path: Path) -> None:
     """The clock and all that it stamps are 48 min ahead: speeds and flags are those of a right one."""
     right, _ = replayed(site_of(tmp_path / "right", mission(LEAP)), "out")
@@ -97,6 +105,7 @@ def test_a_glider_clock_48_minutes_off_changes_times_only(tmp_path: Path) -> Non
     assert wrong[0]["t_dive"] != right[0]["t_dive"]
 
 
+@pytest.mark.slow
 def test_a_clock_that_jumps_both_ways_changes_nothing(site: Site) -> None:
     clock = site.config.with_name("clock")
     jumps = [2 * DAY, -400 * DAY, 30 * DAY, 0.0]

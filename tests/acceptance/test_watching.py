@@ -64,6 +64,7 @@ def test_a_dead_thread_of_the_watcher_is_started_again(site: Site) -> None:
         assert len(daemon.log("observer died, started again")) == 1, "only the rescans find files"
 
 
+@pytest.mark.slow
 def test_what_an_overflow_lost_is_found_at_once_and_all_is_watched_from_then_on(site: Site) -> None:
     site.configure("angus", rescan_seconds=3600)
     with Daemon(site) as daemon:
@@ -91,7 +92,7 @@ def test_at_the_limit_of_inotify_it_polls_and_says_so(site: Site) -> None:
         assert not daemon.log("observer died.*")
 
 
-@pytest.mark.parametrize("observer", ["inotify", "polling"])
+@pytest.mark.parametrize("observer", ["inotify", pytest.param("polling", marks=pytest.mark.slow)])
 def test_a_root_that_is_unmounted_and_back(site: Site, observer: str) -> None:
     site.configure("angus", rescan_seconds=1, observer=observer)
     away = site.root.with_name("away")
@@ -133,6 +134,7 @@ def test_a_fuller_copy_that_waited_while_the_root_was_away_is_taken(site: Site) 
         assert daemon.stop() == 0
 
 
+@pytest.mark.slow
 def test_a_file_that_settled_while_the_root_was_away_is_taken(site: Site) -> None:
     site.configure("angus", rescan_seconds=1)
     away = site.root.with_name("away")

@@ -13,7 +13,7 @@ import pytest
 
 from gliderwatch.model import Alert, Kind, SegmentId, Severity
 from gliderwatch.params import GliderParams
-from gliderwatch.service import intake, transaction
+from gliderwatch.service import judgement, transaction
 from gliderwatch.service.replay import Request, replay
 from gliderwatch.service.routing import Routing
 from gliderwatch.store.state_file import Status, Store
@@ -60,7 +60,7 @@ class Dock:
         return path
 
     def come(self, path: Path, now: float) -> list[Alert]:
-        found = intake.judge_log(path, self.store, lambda glider: glider == "electa")
+        found = judgement.judge_log(path, self.store, lambda glider: glider == "electa")
         if found is None:
             return []
         return list(transaction.take_log(self.store, *found, GliderParams(), SPEAKING, now).alerts)

@@ -23,12 +23,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
+import written
 from alert_support import DISAGREE, SLOW, MemoryStore, alert, incident, until
 from gliderwatch.cli.tables import show_alert
 from gliderwatch.delivery.channels import Channel, DeliveryError, problem, scrub
 from gliderwatch.delivery.dispatcher import Dispatcher
 from gliderwatch.delivery.mail import message_id
-from gliderwatch.messages import incident_text
 from gliderwatch.model import Alert, Kind, Severity
 
 PASSWORD = "s3cr3t-hunter2"
@@ -148,7 +148,7 @@ def slack(hook: Hook, monkeypatch: pytest.MonkeyPatch) -> Hook:
 
 class TestMail:
     def test_text_and_html_as_alternatives_in_utf_8(self, post: Post) -> None:
-        made = incident_text.opened(incident(), SLOW, alert_id="a1", audience=Severity.CRITICAL)
+        made = written.opened(incident(), SLOW, alert_id="a1", audience=Severity.CRITICAL)
         Channel("mail", post.url()).send(made)
         (mail,) = post.inbox.mails
         assert mail.get_content_type() == "multipart/alternative"
@@ -306,7 +306,7 @@ class TestHttp:
         assert payload["type"] == "failure"
 
     def test_slack_text_is_readable_and_escaped(self, slack: Hook) -> None:
-        made = incident_text.opened(incident(), SLOW, alert_id="a", audience=Severity.CRITICAL)
+        made = written.opened(incident(), SLOW, alert_id="a", audience=Severity.CRITICAL)
         evil = alert(title=made.title + " <!channel> &", body=made.body + "<!here|x> <http://e.org|y> & *b*")
         Channel("slack", SLACK).send(evil)
         ((path, payload),) = slack.posts
@@ -348,7 +348,7 @@ class TestHttp:
         from apprise.plugins.custom_json import NotifyJSON
 
         monkeypatch.setattr(NotifyJSON, "body_maxlen", 200)
-        made = incident_text.opened(incident(DISAGREE), DISAGREE, alert_id="a", audience=Severity.CRITICAL)
+        made = written.opened(incident(DISAGREE), DISAGREE, alert_id="a", audience=Severity.CRITICAL)
         Channel("hook", f"json://127.0.0.1:{hook.port}/").send(made)
         ((_, payload),) = hook.posts
         assert len(payload["message"]) <= 200
@@ -517,7 +517,7 @@ for setup in (lambda: None, lambda: logging.basicConfig(level=logging.DEBUG)):
 
 
 def test_show_prints_title_place_and_speed_and_takes_brackets_as_they_are(tmp_path: Path) -> None:
-    made: Alert = incident_text.opened(incident(SLOW), SLOW, alert_id="a", audience=Severity.CRITICAL)
+    made: Alert = written.opened(incident(SLOW), SLOW, alert_id="a", audience=Severity.CRITICAL)
     path = tmp_path / "out.txt"
     with path.open("w") as file:
         show_alert(alert(title="[red]x[/red] [/oops]", body=made.body), Console(file=file, width=100))

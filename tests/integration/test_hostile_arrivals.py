@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.model import Assessment, Incident
 from gliderwatch.params import GliderParams
-from gliderwatch.service import intake, transaction
+from gliderwatch.service import judgement, transaction
 from gliderwatch.service.backlog import Job
 from gliderwatch.simulate.delivery import arrivals as sent
 from gliderwatch.simulate.delivery import write_cache
@@ -44,13 +44,13 @@ class Shore:
         """One file is there, or has changed."""
         path = self.inbox / name
         path.write_bytes(data)
-        job = intake.triage(path, self.store, [self.caches], lambda _: True)
+        job = judgement.judge(path, self.store, [self.caches], lambda _: True)
         now = float(next(self._clock))
         if isinstance(job, Job):
             try:
                 segment = decode(path, [self.caches])
             except GliderwatchError as error:
-                self.store.note(intake.failed(job.file, error), now)
+                self.store.note(judgement.failed(job.file, error), now)
             else:
                 transaction.process_file(self.store, job.file, segment, GliderParams(), None, now)
         elif job is not None:

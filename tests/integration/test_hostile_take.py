@@ -59,7 +59,7 @@ class Loop:
         config = folder / "gliderwatch.yml"
         config.write_text(CONFIG, encoding="utf-8")
         self.daemon, self.hand = Daemon(load(config), config, workers=1), Hand(cache)
-        monkeypatch.setattr(self.daemon._parts.decoder, "submit", self.hand.submit)
+        monkeypatch.setattr(self.daemon._runtime.decoder, "submit", self.hand.submit)
 
     def until(self, condition: Callable[[], object]) -> None:
         """Turn the loop until a condition holds."""
@@ -92,9 +92,9 @@ class Loop:
 def loop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Loop]:
     loop = Loop(tmp_path, monkeypatch)
     yield loop
-    loop.daemon._parts.stop()
+    loop.daemon._runtime.stop()
     loop.daemon._store.close()
-    loop.daemon._life.end()
+    loop.daemon._lock.end()
 
 
 def test_a_file_that_grew_while_it_was_decoded_is_decoded_again_and_taken_once(loop: Loop) -> None:
@@ -162,13 +162,13 @@ def test_a_result_of_another_segment_than_the_header_told_is_not_taken(loop: Loo
 def test_a_file_that_comes_does_not_wait_for_a_folder_full_of_bad_ones(loop: Loop) -> None:
     for number in range(1000):
         (loop.inbox / f"unit_7-2024-250-2-{number}.sbd").touch()
-    loop.until(lambda: loop.daemon._settled)
+    loop.until(lambda: loop.daemon._intake._settled)
     loop.put(WHOLE, 1_000)
     loop.until(lambda: loop.hand.held)
-    assert len(loop.daemon._settled) > 500, "all the others were looked at first"
+    assert len(loop.daemon._intake._settled) > 500, "all the others were looked at first"
     loop.hand.let_go(loop.hand.read())
     loop.until(loop.is_taken)
-    loop.until(lambda: not loop.daemon._settled)
+    loop.until(lambda: not loop.daemon._intake._settled)
     assert len(loop.daemon._store.files(Status.QUARANTINED)) == 1000
 
 
@@ -177,9 +177,9 @@ def test_a_file_that_grew_without_news_before_it_was_looked_at_settles_anew(loop
     path = loop.inbox / "02500003.sbd"
     path.write_bytes(PART)
     loop.daemon._news.put(FileChanged(path, "unit_7"))
-    settling = loop.daemon._parts.settling
+    settling = loop.daemon._runtime.settling
     loop.until(lambda: settling.next_deadline(time.monotonic()) is not None)
-    loop.daemon._parts.watcher.stop()  # from here on no news comes
+    loop.daemon._runtime.watcher.stop()  # from here on no news comes
     loop.until(lambda: (settling.next_deadline(time.monotonic()) or 0.0) < 0.3)
     grown = time.monotonic()
     path.write_bytes(WHOLE)
@@ -193,7 +193,7 @@ def test_a_file_that_is_gone_is_not_remembered_for_ever(loop: Loop) -> None:
     loop.until(lambda: loop.hand.held)
     loop.hand.let_go(loop.hand.read())
     loop.until(loop.is_taken)
-    settling = loop.daemon._parts.settling
+    settling = loop.daemon._runtime.settling
     loop.daemon._scan()
     assert settling.passed(path) is not None
     path.unlink()

@@ -26,7 +26,7 @@ from gliderwatch.config import Problem
 from gliderwatch.delivery.channels import Channel
 from gliderwatch.delivery.mail import Envelope, compose
 from gliderwatch.errors import Quarantine
-from gliderwatch.messages import incident_text
+from gliderwatch.messages import notice_text
 from gliderwatch.model import Alert, Severity
 from gliderwatch.service import logs
 from gliderwatch.service.transaction import FileOutcome
@@ -48,7 +48,7 @@ UNKNOWN = File(PATH, 1, 2, Status.UNKNOWN, NASTY, NASTY, NASTY)
 
 def operator(text: str) -> Alert:
     """A message of which every part comes from outside."""
-    return incident_text.operator(
+    return notice_text.operator(
         text,
         f"first\n{text}",
         1.7e9,

@@ -245,12 +245,12 @@ class TestSignsOfLife:
         )
 
     def test_the_header_of_a_file_that_cannot_be_read(self, fleet) -> None:
-        """What `arrivals.judge` makes of a file tells when it was opened."""
-        from gliderwatch.service.intake import triage
+        """What `judgement.judge` makes of a file tells when it was opened."""
+        from gliderwatch.service.judgement import judge
 
         path, segment = fleet[1][0]
         assert read_header(path).id == segment.id
-        found = triage(path, Store.open(":memory:"), [], lambda glider: True)
+        found = judge(path, Store.open(":memory:"), [], lambda glider: True)
         assert isinstance(found, File) and found.opened_at == segment.id.opened_at
 
     def test_history_is_none(self, fleet) -> None:

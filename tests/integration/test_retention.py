@@ -220,6 +220,7 @@ def test_files_that_are_there_or_whose_folder_is_away_stay_known(store, tmp_path
     assert left == {"there.sbd", "unknown.sbd", "new.sbd", "wait.sbd"}
 
 
+@pytest.mark.slow
 def test_an_interruption_anywhere_leaves_a_good_store(whole, store, tmp_path):
     """After each step, and inside of each: it is whole, a file that comes then leads to the same, and the
     next run ends as one that was not interrupted."""

@@ -29,7 +29,7 @@ def alerts_of(folder: Path, seed: int, rates: CallRates, days: float = 4.0) -> t
 @pytest.mark.parametrize("cause", ["LEAK", "OVERDEPTH"])
 def test_abort_is_told_once_within_one_surfacing(tmp_path: Path, cause: str) -> None:
     words = {"LEAK": "leak", "OVERDEPTH": "too deep"}[cause]
-    for seed in range(10):
+    for seed in range(4):
         rates = CallRates(garbled=0.01, abort=2.0, cause=cause)
         alerts, fates = alerts_of(tmp_path, seed, rates, days=3.0)
         told = [a for a in alerts if a.title == f"cora ABORTED: {words}"]
@@ -40,6 +40,7 @@ def test_abort_is_told_once_within_one_surfacing(tmp_path: Path, cause: str) -> 
         assert start <= told[0].time < start + 6 * 3600
 
 
+@pytest.mark.slow
 def test_nothing_is_told_of_healthy_gliders(tmp_path: Path) -> None:
     for seed in range(10):
         rates = CallRates(dropped=0.05, garbled=0.01)

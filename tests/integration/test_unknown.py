@@ -12,7 +12,7 @@ import pytest
 from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine
 from gliderwatch.model import Alert, Kind, Segment, Severity
 from gliderwatch.params import Attention, GliderParams
-from gliderwatch.service import intake, transaction
+from gliderwatch.service import judgement, transaction
 from gliderwatch.service.backlog import Job
 from gliderwatch.service.replay import Request, replay
 from gliderwatch.service.routing import Routing
@@ -37,7 +37,7 @@ class Live:
         self.alerts: list[Alert] = []
 
     def come(self, path: Path, now: float) -> None:
-        found = intake.triage(path, self.store, self.caches, lambda glider: True)
+        found = judgement.judge(path, self.store, self.caches, lambda glider: True)
         if isinstance(found, File):
             self._note(found, now)
         elif isinstance(found, Job):
@@ -48,7 +48,7 @@ class Live:
             segment = decode(path, self.caches)
             taken = transaction.process_file(self.store, file, segment, GliderParams(), self.speaking, now)
         except GliderwatchError as error:
-            self._note(intake.failed(file, error), now)
+            self._note(judgement.failed(file, error), now)
         else:
             self.alerts += taken.alerts
 
@@ -182,7 +182,7 @@ def test_dives_that_come_and_have_no_flag(copied) -> None:
     live = fed(Live([folder / "cache"]), files, onset(files))
     for path, at in files[onset(files) :]:
         segment = without(decode(path, [folder / "cache"]), *UNSEEN)
-        found = intake.triage(path, live.store, live.caches, lambda glider: True)
+        found = judgement.judge(path, live.store, live.caches, lambda glider: True)
         assert isinstance(found, Job)
         live.alerts += transaction.process_file(
             live.store, found.file, segment, GliderParams(), live.speaking, at

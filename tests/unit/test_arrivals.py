@@ -11,7 +11,7 @@ import pytest
 
 import dinkum
 from gliderwatch.errors import MissingCache, Quarantine, Retry
-from gliderwatch.service import intake
+from gliderwatch.service import judgement
 from gliderwatch.service.backlog import Job
 from gliderwatch.store.segments import Segments
 from gliderwatch.store.state_file import File, Status, Store
@@ -45,7 +45,7 @@ def cache(tmp_path: Path) -> Path:
 
 
 def judge(path: Path, store: Store, *caches: Path, known: bool = True) -> Job | File | None:
-    return intake.triage(path, store, caches, lambda glider: known and glider == "unit_7")
+    return judgement.judge(path, store, caches, lambda glider: known and glider == "unit_7")
 
 
 def noted(path: Path, store: Store, *caches: Path, known: bool = True) -> File:
@@ -68,7 +68,7 @@ def test_a_new_file_is_to_be_decoded(path: Path, cache: Path, store: Store) -> N
     assert (job.file.size, job.file.mtime_ns) == (len(DATA), path.stat().st_mtime_ns)
 
 
-@pytest.mark.parametrize("status", intake.DONE)
+@pytest.mark.parametrize("status", judgement.DONE)
 def test_a_file_that_is_done_with_is_left_alone_until_it_changes(
     path: Path, cache: Path, store: Store, status: Status
 ) -> None:
@@ -117,7 +117,7 @@ def test_a_file_that_could_not_be_decoded_for_now_is_tried_again(
 ) -> None:
     job = judge(path, store, cache)
     assert isinstance(job, Job)
-    store.note(intake.failed(job.file, Retry("the share is away")), 0.0)
+    store.note(judgement.failed(job.file, Retry("the share is away")), 0.0)
     assert isinstance(judge(path, store, cache), Job)
 
 
@@ -194,7 +194,7 @@ def test_a_file_in_a_closed_folder_did_not_go(
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(Path, "stat", closed)
-    assert intake.state(path) == (0, 0)
+    assert judgement.state(path) == (0, 0)
     assert "not there any more" not in noted(path, store).reason
 
 
@@ -211,6 +211,6 @@ def test_a_file_in_a_closed_folder_did_not_go(
     ],
 )
 def test_an_error_decides_whether_a_file_waits(error: Exception, status: Status, crc: str) -> None:
-    file = intake.failed(File("/a.sbd", 1, 2, Status.WAITING, "g", "s", "before", "old"), error)
+    file = judgement.failed(File("/a.sbd", 1, 2, Status.WAITING, "g", "s", "before", "old"), error)
     assert (file.status, file.crc, file.reason) == (status, crc, str(error))
     assert (file.path, file.size, file.mtime_ns, file.glider, file.segment) == ("/a.sbd", 1, 2, "g", "s")

@@ -109,8 +109,8 @@ def test_commands_and_their_options_exist(page: Path) -> None:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_make_targets_and_scripts_exist(page: Path) -> None:
     page_text = page.read_text(encoding="utf-8")
-    targets = set(re.findall(r"^([a-z]+):", text("Makefile"), re.M))
-    assert set(re.findall(r"(?:^|`)make ([a-z]+)", page_text, re.M)) <= targets
+    targets = set(re.findall(r"^([a-z-]+):", text("Makefile"), re.M))
+    assert set(re.findall(r"(?:^|`)make ([a-z-]+)", page_text, re.M)) <= targets
     for script in re.findall(r"python3? ((?:docs|demo)/\w+\.py)", page_text):
         assert (ROOT / script).is_file(), script
 
@@ -207,6 +207,22 @@ def test_benchmarks_are_run_as_their_page_says() -> None:
         assert all(f'"{flag}"' in code for flag in re.findall(r"--[a-z-]+", arguments)), (script, arguments)
 
 
+def test_benchmarks_import_what_there_is() -> None:
+    """They are run by hand and seldom."""
+    gone = []
+    for path in sorted((ROOT / "benchmarks").glob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("gliderwatch"):
+                module = importlib.import_module(str(node.module))
+                gone += [
+                    f"{path.name}: {node.module}.{each.name}"
+                    for each in node.names
+                    if not hasattr(module, each.name)
+                    and importlib.util.find_spec(f"{node.module}.{each.name}") is None
+                ]
+    assert gone == []
+
+
 def test_events_of_the_log_are_described() -> None:
     rows = re.findall(
         r"^\| ((?:`[^`]+`(?:, )?)+) \| (?:info|warning|error) \|", text("docs/operations.md"), re.M
@@ -299,12 +315,13 @@ def test_readme_has_the_counts_of_the_table() -> None:
     default = {fault.partition(":")[0]: n for (fault, way), n in counted().items() if "learnt" in way}
     double = counted()["remora: drag times 2", "`joint`, learnt"]
     sentence = (
-        f"told {double[0]} remoras that double the drag, {default['wing lost'][0]} lost wings that roll, and "
-        f"called {default['none'][0]} healthy gliders faulty"
+        f"found {double[0]} remoras that double the drag, {default['wing lost'][0]} lost wings that roll, "
+        f"and called {default['none'][0]} healthy gliders faulty"
     )
     assert sentence in " ".join(text("README.md").split())
 
 
+@pytest.mark.slow
 def test_limits_are_counted_by_the_script() -> None:
     limits, page = load_script("limits"), text("docs/how-it-decides.md")
     assert {n.split()[2] for pair in counted().values() for n in pair} == {str(limits.SEEDS)}

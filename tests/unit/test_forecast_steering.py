@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from gliderwatch.forecast.steering import WAYS, Plan, courses
+from gliderwatch.forecast.steering import WAYS, Plan, courses, steered
 
 EAST, NORTH = np.array([1.0, 0.0]), np.array([0.0, 1.0])
 STILL = np.zeros(2)
@@ -67,3 +67,20 @@ def test_a_glider_carried_backwards_never_arrives():
     course = courses(plan([(0.0, 500.0)], current=(0.0, -0.4)), 3 * HOUR)[AT]
     assert course.unknown == 0
     assert course.heading == pytest.approx([0, 1])
+
+
+@pytest.mark.parametrize("hours", range(0, 24, 3))
+def test_a_course_is_found_again_whatever_the_tide_was(hours):
+    """No waypoint is sent: the glider holds 60 degrees in a tide of 0.15 m/s, and will on the next dive."""
+    tide = [0.15 * np.array([math.cos(k), math.sin(k)]) for k in (0.5 * hours, 0.5 * hours + 1.5)]
+    goal = 1e7 * np.array([math.cos(1.05), math.sin(1.05)])
+    flown, next_ = (courses(plan([goal], current=c), 3 * HOUR)[AGAINST].heading for c in tide)
+    course = steered(0.9 * flown, 0.25, tide[0])
+    assert course == pytest.approx(1.05)
+    made = courses(plan(heading=flown, bearing=course, current=tide[1]), 3 * HOUR)
+    assert made[AGAINST].heading == pytest.approx(next_)
+    assert made[BEFORE].heading == pytest.approx(flown)
+
+
+def test_a_circle_has_no_course():
+    assert steered(0.1 * EAST, 0.25, STILL) is None

@@ -8,6 +8,7 @@ from alert_support import DISAGREE, SLOW, incident
 from announcing import Talk as Announcer
 from announcing import World, dive
 from gliderwatch.incidents.acknowledgement import acknowledge
+from gliderwatch.incidents.notices import Unjudged
 from gliderwatch.incidents.overdue import (
     ExpectedCall,
     Sign,
@@ -22,7 +23,6 @@ from gliderwatch.incidents.overdue import (
 )
 from gliderwatch.incidents.state_machine import is_severe
 from gliderwatch.incidents.unjudged import blindness
-from gliderwatch.messages.unjudged_text import Unjudged
 from gliderwatch.model import Kind, NextSurfacing, Unusable
 from gliderwatch.params import Attention
 from silent import DAY, HOUR, INTERVAL, MARGIN, T0, Clock, Sea, expected

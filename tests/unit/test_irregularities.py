@@ -7,6 +7,7 @@ import pytest
 
 from clocks import shifted
 from gliderwatch.incidents.irregularities import due, found
+from gliderwatch.messages import irregularity_text
 from gliderwatch.model import Fix, Kind
 from missions import START, Leg, feed, mission
 
@@ -20,8 +21,9 @@ def places(*spots, step=3 * HOUR):
 
 def test_places_that_alternate_are_of_two_gliders():
     (told,) = found("unit", [], places(HERE, THERE, HERE, THERE, HERE, THERE))
-    assert told.title == "files of two gliders come under the name unit"
-    assert "36" in told.text and "27" in told.text and "km apart within 3.0 h" in told.text
+    title, text = irregularity_text.words(told)
+    assert title == "files of two gliders come under the name unit"
+    assert "36" in text and "27" in text and "km apart within 3.0 h" in text
 
 
 @pytest.mark.parametrize(
@@ -61,7 +63,7 @@ def test_two_gliders_whose_files_come_under_one_name(later):
         other.append(replace(moved, id=replace(moved.id, name=f"unit-2023-318-7-{k}")))
     files = random.Random(7).sample(one + other, len(one + other))
     store = feed(files)
-    assert [i.title for i in found("unit", [], store.known("unit").places(12))] == [
+    assert [irregularity_text.title(i) for i in found("unit", [], store.known("unit").places(12))] == [
         "files of two gliders come under the name unit"
     ]
     assert not store.incidents("unit")

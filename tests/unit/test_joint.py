@@ -43,6 +43,19 @@ def test_across_is_left_positive():
     assert seen.across(0.25)[0] == pytest.approx(0.1)  # g - c is 0.1 to the west, left of north
 
 
+def test_a_dive_began_before_its_first_sample_under_water():
+    """Samples come every 7.5 min: on average half of that is missing at either end."""
+    whole = dive(0, Way(heading=0.0, speed=0.25, own=0.25, flow=(0.0, 0.0)))
+    spacing = (whole.t_surface - whole.t_dive) / 24
+    sent = replace(whole, t_dive=whole.t_dive + spacing, t_surface=whole.t_surface - spacing)
+    vectors = whole.track.heading.copy()
+    vectors[[0, -1]] = 0.0
+    seen = observe(replace(sent, track=replace(whole.track, heading=readonly(vectors))))
+    assert seen.steadiness == pytest.approx(1 - 1 / 24)
+    assert seen.own_speed()[0] == pytest.approx(0.25 * 24 / 23)
+    assert observe(whole).steadiness == pytest.approx(1.0)
+
+
 def test_fewer_headings_and_turns_widen_the_uncertainty():
     rng = np.random.default_rng(0)
     swings = rng.normal(0.0, 0.2, 48)

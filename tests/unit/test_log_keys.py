@@ -27,7 +27,7 @@ OF_THE_SERVICE = {
     "folder left out",  # the reason names it, or says what of the machine forbids to watch any
     "heartbeat is late: the one before has not come back",
     "heartbeat not given",  # its URL is a secret
-    "inotify lost events, all is watched anew",
+    "inotify lost events, all folders are watched again",
     "metrics are not served",
     "metrics are served",
     "observer died, started again",

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import written
 from alert_support import DISAGREE, DIVE, HEALTHY, SLOW, SURFACE, incident
-from gliderwatch.messages import incident_text
+from gliderwatch.messages import notice_text
 from gliderwatch.messages.formatting import angle, clean, duration, flow, map_link, place, speed
 from gliderwatch.model import Alert, Assessment, Kind, Severity
 
@@ -40,7 +41,7 @@ class Reader(HTMLParser):
 
 
 def opened(assessment: Assessment = SLOW, kind: Kind = Kind.ANOMALY) -> Alert:
-    return incident_text.opened(incident(assessment, kind=kind), assessment, **WHO)
+    return written.opened(incident(assessment, kind=kind), assessment, **WHO)
 
 
 def section(body: str, heading: str) -> list[str]:
@@ -191,9 +192,9 @@ class TestFalseAlarm:
         told = incident(DISAGREE, kind=Kind.FALSE_ALARM)
         made = [
             opened(DISAGREE, Kind.FALSE_ALARM),
-            incident_text.reminder(told, DISAGREE, 24.0, alert_id="r", audience=Severity.WARNING),
-            incident_text.all_clear(told, DISAGREE, alert_id="c", audience=Severity.WARNING),
-            incident_text.surfacing(DISAGREE, None, alert_id="s"),
+            written.reminder(told, DISAGREE, 24.0, alert_id="r", audience=Severity.WARNING),
+            written.all_clear(told, DISAGREE, alert_id="c", audience=Severity.WARNING),
+            written.surfacing(DISAGREE, None, alert_id="s"),
         ]
         assert made[0].kind == "false_alarm"
         assert not [a for a in made if "false alarm" in f"{a.title} {a.body}".lower()]
@@ -219,7 +220,7 @@ class TestFalseAlarm:
 
 class TestThread:
     def test_reminder(self) -> None:
-        made = incident_text.reminder(incident(), SLOW, 26.0, **WHO)
+        made = written.reminder(incident(), SLOW, 26.0, **WHO)
         assert made.kind is Kind.REMINDER
         assert made.severity is Severity.CRITICAL
         assert made.title.startswith("REMINDER electa: anomaly for 26.0 h, 0.11 m/s")
@@ -227,23 +228,21 @@ class TestThread:
         assert "Worst: 0.11 m/s" in made.body
 
     def test_reminder_after_a_dive_without_result(self) -> None:
-        made = incident_text.reminder(
+        made = written.reminder(
             incident(), replace(HEALTHY, flag=None, reason="no fix", speed=None), 26.0, **WHO
         )
         assert "Latest dive: not assessed (no fix)." in made.body
         assert "flies at" not in made.body
 
     def test_all_clear(self) -> None:
-        made = incident_text.all_clear(incident(cleared_at=SURFACE + 3600), HEALTHY, **WHO)
+        made = written.all_clear(incident(cleared_at=SURFACE + 3600), HEALTHY, **WHO)
         assert (made.kind, made.severity, made.audience) == (Kind.ALL_CLEAR, Severity.INFO, Severity.CRITICAL)
         assert made.title == "ALL CLEAR electa: 0.25 m/s through water (normal 0.22 to 0.30)"
         assert "Lasted: 4.4 h, cleared 2022-11-05 13:34 UTC" in made.body
         assert "Since: 2022-11-05 09:12 UTC" in made.body
 
     def test_correction_withdraws(self) -> None:
-        made = incident_text.correction(
-            incident(), None, HEALTHY, "the final current of the dive arrived", **WHO
-        )
+        made = written.correction(incident(), None, HEALTHY, "the final current of the dive arrived", **WHO)
         assert (made.kind, made.severity) == (Kind.CORRECTION, Severity.INFO)
         assert (
             made.title == "CORRECTION electa: anomaly withdrawn, 0.25 m/s through water (normal 0.22 to 0.30)"
@@ -254,24 +253,24 @@ class TestThread:
 
     def test_correction_changes_numbers(self) -> None:
         now = replace(SLOW, speed=0.151)
-        made = incident_text.correction(incident(), incident(now), now, "a missing segment arrived", **WHO)
+        made = written.correction(incident(), incident(now), now, "a missing segment arrived", **WHO)
         assert made.severity is Severity.CRITICAL
         assert "Told before: anomaly since 2022-11-05 09:12 UTC, 2 dives, worst 0.11 m/s, open" in made.body
         assert "Known now: anomaly since 2022-11-05 09:12 UTC, 2 dives, worst 0.15 m/s, open" in made.body
 
     def test_all_of_one_incident_share_its_thread(self) -> None:
         made = [
-            incident_text.opened(incident(), SLOW, **WHO),
-            incident_text.reminder(incident(), SLOW, 24, **WHO),
-            incident_text.all_clear(incident(), HEALTHY, **WHO),
-            incident_text.correction(incident(), None, HEALTHY, "", **WHO),
+            written.opened(incident(), SLOW, **WHO),
+            written.reminder(incident(), SLOW, 24, **WHO),
+            written.all_clear(incident(), HEALTHY, **WHO),
+            written.correction(incident(), None, HEALTHY, "", **WHO),
         ]
         assert {a.incident for a in made} == {incident().id}
 
 
 class TestNotices:
     def test_surfacing(self) -> None:
-        made = incident_text.surfacing(HEALTHY, DIVE - 1800, alert_id="s")
+        made = written.surfacing(HEALTHY, DIVE - 1800, alert_id="s")
         assert made.title == "SURFACED electa 2022-11-05 12:34 UTC: 0.25 m/s, normal"
         assert (made.kind, made.severity, made.incident) == (Kind.SURFACING, Severity.INFO, "")
         assert "After the one before: 3.9 h" in made.body
@@ -279,10 +278,10 @@ class TestNotices:
         assert "Flow learnt: 0.23 m/s" in made.body
 
     def test_first_surfacing_has_no_one_before(self) -> None:
-        assert "After the one before" not in incident_text.surfacing(HEALTHY, None, alert_id="s").body
+        assert "After the one before" not in written.surfacing(HEALTHY, None, alert_id="s").body
 
     def test_operator(self) -> None:
-        made = incident_text.operator(
+        made = notice_text.operator(
             "no new files", "None for 6 h.\n\nCheck it.", SURFACE, severity=Severity.WARNING, **WHO
         )
         assert made.title == "GLIDERWATCH: no new files"
@@ -309,12 +308,12 @@ class TestNothingBreaksOut:
         dive = replace(SLOW, glider=glider, segment=segment, notes=(note,), reason=why)
         case = incident(dive)
         for made in (
-            incident_text.opened(case, dive, **WHO),
-            incident_text.reminder(case, replace(dive, flag=None), 24, **WHO),
-            incident_text.all_clear(case, dive, **WHO),
-            incident_text.correction(case, None, dive, why, **WHO),
-            incident_text.surfacing(dive, None, alert_id="s"),
-            incident_text.operator(note, why, SURFACE, severity=Severity.INFO, glider=glider, **WHO),
+            written.opened(case, dive, **WHO),
+            written.reminder(case, replace(dive, flag=None), 24, **WHO),
+            written.all_clear(case, dive, **WHO),
+            written.correction(case, None, dive, why, **WHO),
+            written.surfacing(dive, None, alert_id="s"),
+            notice_text.operator(note, why, SURFACE, severity=Severity.INFO, glider=glider, **WHO),
         ):
             self.check(made)
 

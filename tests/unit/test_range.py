@@ -48,9 +48,19 @@ def test_short_dives_after_launch_do_not_count():
 def test_short_dives_count_when_the_trials_after_launch_are_over():
     """A coastal glider may surface every half hour for weeks."""
     normal = Normal()
-    for before in range(12):
+    for before in range(11):
         normal = learn(normal, 0.2 + 0.01 * before, 0.0, 1800.0, PARAMS, before)
-    assert normal.speeds == pytest.approx([0.28, 0.29, 0.30, 0.31])
+    assert normal.speeds == pytest.approx([0.28, 0.29, 0.30])
+
+
+@pytest.mark.parametrize("hours", [0.5, 1.0, 1.4, 3.0, 6.0])
+def test_a_range_rests_on_three_days_however_short_the_dives_are(hours):
+    """Water that is a little denser or lighter stays for a day, so that dives of a day are hardly one."""
+    normal = Normal()
+    for before in range(400):
+        normal = learn(normal, before * hours / 24, 0.0, hours * 3600, PARAMS, before)
+    assert len(normal.speeds) == PARAMS.most
+    assert normal.speeds[-1] - normal.speeds[0] > 2.5  # days
 
 
 def test_only_the_first_dives_teach():

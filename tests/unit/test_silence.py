@@ -7,6 +7,7 @@ from math import hypot
 import pytest
 
 from alert_support import incident
+from gliderwatch.incidents.notices import Fleet
 from gliderwatch.incidents.overdue import (
     FRESH,
     GONE,
@@ -20,7 +21,6 @@ from gliderwatch.incidents.overdue import (
     is_at_sea,
     margin,
 )
-from gliderwatch.messages.overdue_text import Fleet
 from gliderwatch.model import Severity
 from gliderwatch.navigation.geodesy import to_plane
 from silent import CALL, DAY, HOUR, INTERVAL, MARGIN, T0, Clock, Sea, expected

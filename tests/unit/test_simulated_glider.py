@@ -70,6 +70,14 @@ def test_current_is_reported_in_magnetic_axes_and_true_to_the_flight_model() -> 
         np.testing.assert_allclose(dive.current, np.array(truth.current) - excess, atol=2.5e-3)
 
 
+@pytest.mark.parametrize("allowed", [0.0, 0.5, 1.0])
+def test_what_is_allowed_for_on_board_is_not_in_the_current(allowed: float) -> None:
+    """The angle of attack takes a tenth of depth rate over tan(pitch)."""
+    truth = simulate(replace(STRAIGHT, days=1.0, allowed=allowed)).truth
+    over = [dive.believed_speed / dive.speed - 1 for dive in truth]
+    assert np.median(over) == pytest.approx((1 - allowed) * 0.115, abs=0.02)
+
+
 def test_truth_adds_up_to_the_way_over_ground() -> None:
     mission = simulate(STRAIGHT)
     for dive, truth in zip(closures(mission, STRAIGHT.variation), mission.truth, strict=False):

@@ -129,7 +129,7 @@ def test_a_layer_moves_up_and_down_with_its_wave() -> None:
     water = Water(20.0, 35.0, (layer,))
     depth = np.linspace(0, 60, 601)
     for t, expected in ((0.0, 30.0), (10e3, 36.0), (20e3, 30.0), (30e3, 24.0)):
-        temperature, salinity = water.properties(np.full(601, t), np.zeros(601), depth)
+        temperature, salinity = water.properties(np.full(601, t), np.zeros(601), np.zeros(601), depth)
         assert depth[np.argmin(np.abs(temperature - 16.0))] == pytest.approx(expected, abs=0.06)
         assert (temperature[0], temperature[-1]) == pytest.approx((20.0, 12.0), abs=1e-3)
         assert salinity[-1] - salinity[0] == pytest.approx(1.0, abs=1e-3)

@@ -9,11 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gliderwatch.incidents.notices import Unjudged
 from gliderwatch.incidents.notifications import NotificationState, unacknowledged
 from gliderwatch.incidents.overdue import Sign
 from gliderwatch.incidents.unjudged import Unknown, announce, blindness
+from gliderwatch.messages.notice_text import render
 from gliderwatch.messages.template import escalated
-from gliderwatch.messages.unjudged_text import CURES, Unjudged
+from gliderwatch.messages.unjudged_text import CURES
 from gliderwatch.model import Alert, Hindrance, Kind, NextSurfacing, Severity, Unusable
 from gliderwatch.params import Attention
 
@@ -72,7 +74,7 @@ class Talk:
     def hear(self, k: int, *cause: Unusable | Hindrance | str | None) -> list[Kind]:
         self.sea.dive(k, *cause)  # type: ignore[arg-type]
         self.said, new = announce(self.said, self.sea, self.attention, 24.0, now(k))
-        self.alerts += new
+        self.alerts += map(render, new)
         return [a.kind for a in new]
 
 

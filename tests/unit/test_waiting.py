@@ -9,6 +9,7 @@ from zoneinfo import ZoneInfo
 
 import pytest
 
+import written
 from alert_support import SLOW, alert, incident
 from announcing import World
 from gliderwatch.incidents.acknowledgement import acknowledge
@@ -16,7 +17,6 @@ from gliderwatch.incidents.notifications import NotificationState, due_notificat
 from gliderwatch.incidents.overdue import ExpectedCall, Silence
 from gliderwatch.incidents.send_schedule import AT_ONCE, NO_INCIDENT, Due, QuietHours, Standing, Wait
 from gliderwatch.incidents.send_schedule import due as goes_out
-from gliderwatch.messages import incident_text
 from gliderwatch.messages.template import escalated
 from gliderwatch.model import Incident, Severity
 
@@ -139,7 +139,7 @@ def test_an_escalated_message_says_why_it_comes_and_what_to_do() -> None:
 
 
 def test_a_mail_says_it_above_all_else() -> None:
-    made = incident_text.opened(incident(), SLOW, alert_id="a", audience=Severity.CRITICAL)
+    made = written.opened(incident(), SLOW, alert_id="a", audience=Severity.CRITICAL)
     told = escalated(replace(made, incident="electa/anomaly/1"), 60.0)
     place = told.html.index("Nobody has acknowledged this for 1 min")
     assert told.html.index("<body") < place < told.html.index("<b>ANOMALY electa")

@@ -242,10 +242,10 @@ def _ntp() -> str | None:
     """`yes` or `no` as timedatectl tells, None where it does not."""
     command = ["timedatectl", "show", "--property=NTPSynchronized", "--value"]
     try:
-        told = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False)
+        result = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False)
     except (OSError, subprocess.TimeoutExpired):
         return None
-    return told.stdout.strip() if told.stdout.strip() in {"yes", "no"} else None
+    return result.stdout.strip() if result.stdout.strip() in {"yes", "no"} else None
 
 
 # ----------------------------------------

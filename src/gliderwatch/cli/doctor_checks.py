@@ -17,7 +17,7 @@ from typing import Any
 from gliderwatch.config import Config, Problem, expand
 from gliderwatch.delivery.channels import Channel, DeliveryError
 from gliderwatch.errors import ConfigError, DamagedError, GliderwatchError, MissingCache, StateError
-from gliderwatch.messages import incident_text
+from gliderwatch.messages import notice_text
 from gliderwatch.messages.formatting import clean, duration
 from gliderwatch.messages.samples import sample
 from gliderwatch.model import Alert, Kind, Severity
@@ -340,15 +340,15 @@ def state(config: Config, problems: Iterable[Problem]) -> Findings:
         yield note("state", f"{path} is not there yet: the service makes it at its first start")
         return
     try:
-        version, told = schema_version(path), quick_check(path)
+        version, pages = schema_version(path), quick_check(path)
     except DamagedError as problem:
-        told, version = str(problem), SCHEMA
+        pages, version = str(problem), SCHEMA
     except StateError as problem:
         yield error("state", str(problem), "ask as the user of the service; else see docs/state-file.md")
         return
-    if told != "ok":
+    if pages != "ok":
         cure = "stop the service, move the file away, start: all is learnt anew from the files"
-        yield error("state", f"{path} is damaged: {told}", cure)
+        yield error("state", f"{path} is damaged: {pages}", cure)
     elif version < SCHEMA:
         yield note("state", f"{path} is whole; schema {version} becomes {SCHEMA} at the next start")
     else:
@@ -415,7 +415,7 @@ def try_channel(config: Config, name: str, alert: Alert | None = None) -> str | 
 
 
 def _test(name: str, now: float) -> Alert:
-    return incident_text.operator(
+    return notice_text.operator(
         "test of a channel",
         f"If you can read this, the channel {name} of gliderwatch works.",
         now,

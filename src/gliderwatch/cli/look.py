@@ -27,6 +27,7 @@ SAMPLES = (
     "all_clear",
     "reminder",
     "correction",
+    "regime",
     "surfacing",
     "operator",
 )

@@ -8,6 +8,7 @@ import sys
 import click
 
 from gliderwatch import __version__
+from gliderwatch.cli.field import field
 from gliderwatch.cli.look import LOOKING
 from gliderwatch.cli.manage import COMMANDS
 from gliderwatch.cli.options import Group
@@ -25,5 +26,5 @@ def main() -> None:
             stream.reconfigure(errors="replace")
 
 
-for command in (run, *LOOKING, *COMMANDS, simulate, score):
+for command in (run, *LOOKING, *COMMANDS, field, simulate, score):
     main.add_command(command)

@@ -108,12 +108,12 @@ def mute_glider(config: Config, glider: str, end: float, now: float) -> list[str
         store.notes.mute(name, end, now)
         withdraw_answered(store, name, now, quiet=True)
         heeded = with_mute(config.attention(name), store.notes.muted_until(name))
-    told = [f"{name}: muted until {utc(end)}"]
+    lines = [f"{name}: muted until {utc(end)}"]
     if heeded.muted_until is not None and heeded.muted_until > end:
-        told.append(f"muted_until of the configuration is later and counts: {utc(heeded.muted_until)}")
+        lines.append(f"muted_until of the configuration is later and counts: {utc(heeded.muted_until)}")
     if heeded.recovered:
-        told.append("it is marked recovered: nothing is told of it in any case")
-    return told
+        lines.append("it is marked recovered: no message about it is sent in any case")
+    return lines
 
 
 def unmute_glider(config: Config, glider: str, now: float) -> list[str]:

@@ -16,7 +16,7 @@ from gliderwatch.incidents.constants import SPEED_CHANGE
 from gliderwatch.incidents.notifications import as_notified
 from gliderwatch.messages.formatting import clean, utc
 from gliderwatch.model import Assessment, Flag, Incident, Segment, SegmentId
-from gliderwatch.service import intake, transaction
+from gliderwatch.service import judgement, transaction
 from gliderwatch.service.backlog import Job
 from gliderwatch.service.liveness import PidLock, is_held
 from gliderwatch.service.runtime import OceanCache
@@ -213,6 +213,7 @@ def _fill(work: _Work, paths: Sequence[str], held: Sequence[SegmentId], on_step:
     steps.sort(key=_turn)
     ocean = OceanCache(work.config)
     with Decoder(caches, max_workers=2) as decoder:
+        decoder.science = bool(work.config.fields)
         results = decoder.map([Path(job.file.path) for _, job in steps if job is not None])
         for done, (identity, job) in enumerate(steps, 1):
             segment = _fuller(work, identity) if job is None else next(results)[1]
@@ -225,7 +226,7 @@ def _fill(work: _Work, paths: Sequence[str], held: Sequence[SegmentId], on_step:
 def _jobs(work: _Work, paths: Sequence[str], caches: Sequence[Path]) -> Iterator[Job]:
     """The files that are there and can be decoded; of the others, why not."""
     for path in paths:
-        found = intake.triage(Path(path), work.new, caches, lambda name: name == work.glider)
+        found = judgement.judge(Path(path), work.new, caches, lambda name: name == work.glider)
         if isinstance(found, Job):
             yield found
         elif found is not None and found.status != Status.UNKNOWN:
@@ -256,9 +257,7 @@ def _take(
     params, field_ = work.config.glider(work.glider), ocean.field(work.glider)
     try:
         with work.new.followed_by(following):
-            taken = transaction.process_file(
-                work.new, file, segment, params, None, time.time(), ocean=field_, limits={}
-            )
+            taken = transaction.process_file(work.new, file, segment, params, None, time.time(), ocean=field_)
     except Quarantine as error:
         work.problems.append((file.path or segment.id.name, str(error)))
         return

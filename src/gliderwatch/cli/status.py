@@ -13,8 +13,9 @@ from gliderwatch.config import Config, linked_gliders
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.incidents.acknowledgement import Ack, Acks, acknowledge, with_mute
 from gliderwatch.incidents.constants import GONE, RECENT
-from gliderwatch.incidents.irregularities import Irregularity
+from gliderwatch.incidents.notices import Irregularity
 from gliderwatch.incidents.overdue import ExpectedCall, expected_call, guess, is_launched
+from gliderwatch.messages import irregularity_text
 from gliderwatch.messages.formatting import clean
 from gliderwatch.model import Assessment, Incident, NextSurfacing
 from gliderwatch.params import Attention
@@ -264,7 +265,9 @@ def status_as_json(view: Overview) -> dict[str, Any]:
                 "dives": g.dives,
                 "latest": assessment_line(g.latest) if g.latest is not None else None,
                 "incidents": [_incident(i, g.acks) for i in g.incidents],
-                "irregularities": [{"since": iso(i.t), "title": i.title} for i in g.irregularities],
+                "irregularities": [
+                    {"since": iso(i.t), "title": irregularity_text.title(i)} for i in g.irregularities
+                ],
                 **_silence(g),
             }
             for g in view.gliders

@@ -13,6 +13,7 @@ from rich.text import Text
 from gliderwatch.cli.status import GliderStatus, IncidentEntry, Overview
 from gliderwatch.config import Problem
 from gliderwatch.incidents.acknowledgement import Ack
+from gliderwatch.messages import irregularity_text
 from gliderwatch.messages.formatting import clean, duration, utc
 from gliderwatch.model import Alert, Assessment, Flag, Incident, Kind, Severity
 from gliderwatch.service.jsonl import iso
@@ -132,7 +133,10 @@ def status(view: Overview, console: Console) -> None:
             console.print(Text(text + taken_on, style=_STYLES[i.severity]))
     for glider in view.gliders:
         for each in glider.irregularities:
-            console.print(Text(f"since {utc(each.t)}: {clean(each.title)}", style="yellow"), soft_wrap=True)
+            console.print(
+                Text(f"since {utc(each.t)}: {clean(irregularity_text.title(each))}", style="yellow"),
+                soft_wrap=True,
+            )
     files(view.files, [*view.waiting, *view.quarantined], console)
     for name, link in view.links.items():
         text = f"{clean(name, 30)}: {clean(str(link), 600)} ({clean(link.cure, 600)})"
@@ -175,25 +179,25 @@ def _glider(g: GliderStatus) -> list[str]:
 
 def _next(g: GliderStatus) -> list[tuple[str, str]]:
     """The next surfacing of a glider, or its silence, and why nothing may be told of it: style and text."""
-    name, call, told = clean(g.name, 30), g.awaited, list[tuple[str, str]]()
+    name, call, lines = clean(g.name, 30), g.awaited, list[tuple[str, str]]()
     if g.attention.recovered:
         return [("dim", f"{name}: recovered, nothing is told of it")]
     if g.is_muted and g.attention.muted_until is not None:
-        told = [("dim", f"{name}: muted until {utc(g.attention.muted_until)}")]
+        lines = [("dim", f"{name}: muted until {utc(g.attention.muted_until)}")]
     if not g.configured:
-        return told
+        return lines
     if call is None:
         why = "no dive yet" if g.latest is None else "its next surfacing cannot be said yet"
-        return [*told, ("dim", f"{name}: not missed while it is silent, {why}")]
+        return [*lines, ("dim", f"{name}: not missed while it is silent, {why}")]
     if g.is_over:
-        return [*told, ("dim", f"{name}: last heard {utc(call.heard)}, its deployment seems over")]
+        return [*lines, ("dim", f"{name}: last heard {utc(call.heard)}, its deployment seems over")]
     silent = duration(g.at - call.heard)
     if g.overdue_since is not None:
         text = f"{name}: OVERDUE since {utc(g.overdue_since)}, silent for {silent}"
-        return [*told, ("bold red", text)]
+        return [*lines, ("bold red", text)]
     late = f", {duration(g.at - call.t)} late" if g.at > call.t else ""
     where = "" if g.place is None else f" near {g.place[0]:.3f} {g.place[1]:.3f}"
-    return [*told, ("yellow" if late else "", f"{name}: next surfacing {utc(call.t)}{where}{late}")]
+    return [*lines, ("yellow" if late else "", f"{name}: next surfacing {utc(call.t)}{where}{late}")]
 
 
 def acknowledged(ack: Ack, incident: Incident) -> str:

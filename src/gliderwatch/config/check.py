@@ -164,7 +164,7 @@ def _channels(config: Config) -> _Findings:
 
 def _recipients(config: Config) -> _Findings:
     if not config.recipients:
-        yield _warning("recipients", "there are none: nobody is told anything", "add one")
+        yield _warning("recipients", "there are none: nobody gets a message", "add one")
         return
     used = {channel for recipient in config.recipients.values() for channel in recipient.channels}
     for channel in sorted(set(config.channels) - used):

@@ -18,6 +18,7 @@ from gliderwatch.config.health import limits_of
 from gliderwatch.config.schema import (
     Channel,
     Dockserver,
+    FieldSetting,
     Glider,
     Heartbeat,
     Metrics,
@@ -44,6 +45,9 @@ class Config(Section):
 
     dockserver: Dockserver = Field(description="Where files arrive.")
     ocean: Ocean = Field(default=Ocean(), description="An ocean model, for `reference: model`.")
+    fields: dict[Name, FieldSetting] = Field(
+        default_factory=dict, description="Fields that the gliders measure together."
+    )
     state: State = Field(default=State(), description="What gliderwatch remembers.")
     defaults: Settings = Field(default=Settings(), description="Settings of all gliders.")
     gliders: dict[GliderName, Glider] = Field(
@@ -52,7 +56,7 @@ class Config(Section):
     )
     channels: dict[Name, Channel] = Field(default_factory=dict, description="Ways to send messages.")
     recipients: dict[Name, Recipient] = Field(default_factory=dict, description="Who gets what.")
-    operator: Operator = Field(default=Operator(), description="When the operator is told.")
+    operator: Operator = Field(default=Operator(), description="When the operator gets a message.")
     heartbeat: Heartbeat = Field(default=Heartbeat(), description="For a dead man's switch.")
     metrics: Metrics = Field(default=Metrics(), description="For Prometheus.")
     _document: Document = PrivateAttr(Document(Path("configuration"), None, {}))

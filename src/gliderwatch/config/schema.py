@@ -26,6 +26,7 @@ from gliderwatch.config.fields import (
     Zone,
 )
 from gliderwatch.config.health import Health
+from gliderwatch.fleet.constants import APART
 from gliderwatch.incidents import send_schedule
 from gliderwatch.model import Severity
 from gliderwatch.params import AnomalyRule, Attention, FalseAlarmRule, GliderParams, LearnerParams, RuleParams
@@ -136,13 +137,13 @@ class FalseAlarm(Section):
 
 
 class Rules(Section):
-    """How flags become incidents, and how often an open one is brought to mind."""
+    """How flags become incidents, and how often reminders of an open one come."""
 
     anomaly: Anomaly = Field(default=Anomaly(), description="Flag 1.")
     false_alarm: FalseAlarm = Field(default=FalseAlarm(), description="Flag 2.")
     reminder_hours: Annotated[Number, Field(gt=0, le=8760)] | None = Field(
         default=_R.reminder_hours,
-        description="Hours until an open incident is brought to mind; again after 2, 4, 7, 14, ... times "
+        description="Hours until the reminder of an open incident; again after 2, 4, 7, 14, ... times "
         "that; null: none.",
     )
 
@@ -180,12 +181,12 @@ class Settings(Preset):
 
     unknown_hours: Annotated[Number, Field(gt=0, le=720)] | None = Field(
         default=_A.unknown_hours,
-        description="Hours without a dive that could be judged, although files come, after which that is "
-        "told (at least two intervals between surfacings); null: hours do not count.",
+        description="Hours without a dive that could be judged, although files come, after which a message "
+        "comes (at least two intervals between surfacings); null: hours do not count.",
     )
     unknown_dives: Count | None = Field(
         default=_A.unknown_dives,
-        description="Dives in a row that could not be judged after which that is told; null: their number "
+        description="Dives in a row without a judgement after which a message comes; null: their number "
         "does not count.",
     )
 
@@ -222,8 +223,8 @@ class Glider(Settings):
     )
     muted_until: Moment | None = Field(
         default=None,
-        description="Nothing is told of it until then; it is assessed all the same. A date (`2026-12-01`: "
-        "from 00:00 UTC on it is told of again) or a date and time in UTC (`2026-12-01 14:30`).",
+        description="No messages about it until then; it is still assessed. A date (`2026-12-01`: "
+        "messages from 00:00 UTC on) or a date and time in UTC (`2026-12-01 14:30`).",
     )
     recovery: Moment | None = Field(
         default=None,
@@ -231,12 +232,12 @@ class Glider(Settings):
         "that. A date (`2026-12-01`) or a date and time in UTC.",
     )
     recovered: Switch = Field(
-        default=False, description="It is out of the water: nothing is told of it, its silence least of all."
+        default=False, description="It is out of the water: no messages about it, and it is not overdue."
     )
 
 
 # ----------------------------------------
-# The sections of the settings that are of the service: where files come, who is told, how it is watched.
+# The sections of the settings that are of the service: where files come, who gets messages, its own watch.
 
 
 class Dockserver(Section):
@@ -283,6 +284,65 @@ class Ocean(Section):
     stale_hours: Annotated[Number, Field(gt=0, le=8760)] = Field(
         default=STALE / 3600, description="Hours beyond the last time of the files until which it is used."
     )
+
+
+class FieldAdvice(Section):
+    """Where gliders are advised to look next for a field. Nothing is ever sent to a glider."""
+
+    outputs: AbsolutePath = Field(
+        description="Folder for the mission arguments `goto` of each glider, for a pilot to check and send."
+    )
+    way: Literal["look_ahead", "gradient"] = Field(
+        default="look_ahead",
+        description="`look_ahead`: the best of 12 headings for the whole leg; `gradient`: that of the paper.",
+    )
+    polygon: tuple[
+        tuple[Annotated[Number, Field(ge=-90, le=90)], Annotated[Number, Field(ge=-180, le=360)]], ...
+    ] = Field(
+        default=(),
+        description="Corners [latitude, longitude] of where gliders may be sent; empty: the whole box.",
+    )
+    shallowest: Annotated[Number, Field(ge=0, le=12000)] | None = Field(
+        default=None,
+        description="Water depth (m) that is too shallow, by what the gliders have measured nearest to the "
+        "way; null: any is deep enough.",
+    )
+    apart_km: Annotated[Number, Field(ge=0, le=1000)] = Field(
+        default=APART / 1e3, description="Distance that waypoints keep from other gliders (km)."
+    )
+
+    @model_validator(mode="after")
+    def _has_corners(self) -> FieldAdvice:
+        if 0 < len(self.polygon) < 3:
+            raise ValueError("polygon needs three corners or more")
+        return self
+
+
+class FieldSetting(Section):
+    """A field that the gliders measure together in a part of the sea (`fleet`)."""
+
+    box: BoxSetting = Field(description="The part of the sea.")
+    depth: tuple[Annotated[Number, Field(ge=0)], Annotated[Number, Field(gt=0, le=2000)]] = Field(
+        description="Its top and bottom (m)."
+    )
+    sensor: Literal["sci_water_temp", "salinity", "density", "oxygen"] = Field(
+        default="sci_water_temp",
+        description="What is measured; salinity and density (potential, less 1000 kg/m3) follow by TEOS-10.",
+    )
+    estimator: Literal["fading", "literal"] = Field(
+        default="fading",
+        description="`fading`: what is known fades, and the mean profile is apart; `literal`: as the paper "
+        "has it.",
+    )
+    advice: FieldAdvice | None = Field(default=None, description="Where to look next; null: none is given.")
+
+    @model_validator(mode="after")
+    def _has_extent(self) -> FieldSetting:
+        if not (self.box.south < self.box.north and self.box.west % 360 != self.box.east % 360):
+            raise ValueError("box is empty: south must be below north, and west another than east")
+        if not self.depth[0] < self.depth[1]:
+            raise ValueError("depth is empty: write [TOP, BOTTOM]")
+        return self
 
 
 class State(Section):
@@ -337,28 +397,29 @@ class Metrics(Section):
 
 
 class Operator(Section):
-    """When those who run gliderwatch are told that the watch itself is in trouble."""
+    """When those who run gliderwatch get a message about a problem of the watch itself."""
 
     silent_hours: Annotated[Number, Field(gt=0, le=8760)] | None = Field(
         default=24.0,
         description="Hours without a file of any glider, or of one in the water while others call; "
-        "null: never told.",
+        "null: never.",
     )
     quarantined_per_day: Annotated[int, Field(strict=True, ge=1, le=100_000)] | None = Field(
         default=20,
-        description="More files of one glider than so many quarantined within 24 h; null: never told.",
+        description="More files of one glider than this quarantined within 24 h; null: never.",
     )
     waiting_hours: Annotated[Number, Field(gt=0, le=8760)] | None = Field(
         default=6.0,
-        description="Hours that files of a glider have waited (for a cache file, ...); null: never told.",
+        description="Hours that files of a glider have waited (for a cache file, ...); null: never.",
     )
     channel_hours: Annotated[Number, Field(gt=0, le=720)] | None = Field(
         default=1.0,
-        description="Hours that a channel has not delivered a message, told by the others; null: never told.",
+        description="Hours that a channel has not delivered a message (the other channels report it); "
+        "null: never.",
     )
     free_mb: Annotated[Number, Field(gt=0, le=1e9)] | None = Field(
         default=500.0,
-        description="Less free in the folder of the state file than this (MB); null: never told.",
+        description="Less free space than this in the folder of the state file (MB); null: never.",
     )
 
 

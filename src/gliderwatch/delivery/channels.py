@@ -211,17 +211,17 @@ def _service(url: str) -> tuple[Any, tuple[str, ...]]:
         service = None
     finally:
         logger.removeHandler(warnings)
-    told = tuple(dict.fromkeys(scrub(text, url) for text in warnings.texts))
+    warned = tuple(dict.fromkeys(scrub(text, url) for text in warnings.texts))
     if service is not None and _is_mail(service) and not _names_somebody(url):
         raise DeliveryError(_NOBODY)
     if service is None:
-        reason = "; ".join(told) or "no service known for it"
+        reason = "; ".join(warned) or "no service known for it"
         raise DeliveryError(f"not an Apprise URL that can be used: {reason}")
     if "rto=" not in url:
         service.socket_read_timeout = READ_TIMEOUT
     if "overflow=" not in url:
         service.overflow_mode = apprise.OverflowMode.TRUNCATE  # a cut alert says more than a refused one
-    return service, told
+    return service, warned
 
 
 def _is_mail(service: Any) -> bool:

@@ -16,7 +16,7 @@ from zlib import crc32
 import structlog
 
 from gliderwatch.delivery.channels import DeliveryError
-from gliderwatch.messages import incident_text
+from gliderwatch.messages import notice_text
 from gliderwatch.messages.template import escalated
 from gliderwatch.model import Alert, Severity
 
@@ -261,10 +261,10 @@ class Dispatcher:
                 pause = self._pass(store)
                 trouble, self._beat = "", time.monotonic()
             except Exception as error:  # a locked or full disk passes: this thread must not end by it
-                if (told := f"{type(error).__name__}: {error}") != trouble:
-                    log.error("outbox cannot be read or written", error=told)
+                if (failure := f"{type(error).__name__}: {error}") != trouble:
+                    log.error("outbox cannot be read or written", error=failure)
                 _close(store)
-                store, pause, trouble = None, 1.0, told
+                store, pause, trouble = None, 1.0, failure
             self._wake.wait(pause)
         _close(store)
         for worker in self._workers.values():
@@ -365,7 +365,7 @@ def _report_of(row: OutboxRow, error: str, now: float) -> Alert:
         "It is not tried again there, nor are others that are refused so; `gliderwatch status` lists them. "
         f"Correct the channel's URL, then try `gliderwatch test-alert --channel {row.channel}`."
     )
-    return incident_text.operator(
+    return notice_text.operator(
         f"channel {row.channel} refuses messages",
         text,
         now,

@@ -120,19 +120,22 @@ def observe(dive: Dive) -> Observation:
     dt = np.diff(track.t)
     interval = float(dt.sum())
     flying = np.any(track.heading != 0, axis=1)
-    share = dt[flying] / interval
+    late = _not_logged(dive, dt[flying])
+    share = dt[flying] / interval * (1 + late / max(float(dt[flying].sum()), 1.0))
     flown, vectors = float(share.sum()), track.heading[flying]
     current = dive.current
     ground = track.x[-1] / interval
     velocities = (np.diff(track.x, axis=0) / np.maximum(dt, 1e-3)[:, None])[flying]
     vectors, spread = _directed(vectors, velocities, share, dive)
     error = REPORTED if current is None or current.final else PROVISIONAL
+    heading = share @ vectors
+    along = heading / max(float(np.hypot(*heading)), 1e-6)
     return Observation(
         start=float(track.t[0]),
         end=float(track.t[-1]),
         ground=readonly(ground),
         ground_cov=readonly((2 * (GPS / interval) ** 2 + ((1 - flown) * SURFACE_FLOW) ** 2) * np.eye(2)),
-        heading=readonly(share @ vectors),
+        heading=readonly(heading),
         heading_cov=readonly(
             (
                 _missing(dive, interval, flown)
@@ -140,6 +143,7 @@ def observe(dive: Dive) -> Observation:
                 else _heading_cov(vectors, share, dive, interval)
             )
             + spread
+            + (late / interval) ** 2 / 3 * np.outer(along, along)
         ),
         is_free=_is_free(dive),
         current=None if current is None else readonly([current.u, current.v]),
@@ -147,6 +151,19 @@ def observe(dive: Dive) -> Observation:
         slip=_slip(dive),
         unseen=_unseen(dt[flying]),
     )
+
+
+def _not_logged(dive: Dive, dt: Array) -> float:
+    """Seconds of a dive before its first sample under water and after its last, of which nothing tells.
+
+    Both lie within a spacing ``dt`` (s, (k,)) of samples, and within the time to the fix: half of that on
+    average, with a third of its square as the variance.
+    """
+    if dive.start is None or dive.end is None or not len(dt):
+        return 0.0
+    usual = median(dt.tolist())
+    gaps = (dive.t_dive - dive.start.t, dive.end.t - dive.t_surface)
+    return float(sum(min(max(gap, 0.0), usual) / 2 for gap in gaps))
 
 
 def are_apart(end: Fix, start: Fix) -> bool:

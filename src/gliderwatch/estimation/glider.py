@@ -123,6 +123,8 @@ def _numbers(verdict: Verdict, info: JointInfo) -> dict[str, float]:
     }
     if verdict.normal.dives:
         out |= {"usual_speed": verdict.normal.usual, "usual_dives": float(verdict.normal.dives)}
+    if verdict.before is not None:
+        out["usual_before"] = verdict.before
     if info.loss is not None:
         out["loss_ratio"] = info.loss.ratio
     if info.across is not None:

@@ -29,7 +29,8 @@ class RangeParams:
     is ``width`` robust standard deviations; downwards at least ``narrowest`` and at most ``widest`` of the
     median, so that a loss of 30 % is always outside, upwards at least ``above`` of it. ``shortest`` (s)
     is how long a dive must be to count among the first ``trials`` of a deployment: on the short ones after
-    launch pilots try out the ballast.
+    launch pilots try out the ballast. Of dives shorter than ``spacing`` (s) fewer are used, so that ``most``
+    reach over three days: water that is a little denser or lighter stays for a day.
     """
 
     least: int = 3
@@ -40,6 +41,7 @@ class RangeParams:
     above: float = 0.35
     shortest: float = 3600.0
     trials: int = 8
+    spacing: float = 3 * 3600.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +73,9 @@ def learn(
 ) -> Normal:
     """The healthy dives with one more, of a ``duration`` (s) at a setting, after all that came ``before``."""
     is_trial = duration < params.shortest and before < params.trials
-    if is_trial or int(_alike(normal, at).sum()) >= params.most:
+    known = int(_alike(normal, at).sum())
+    every = max(round(params.spacing / max(duration, 1.0)), 1)
+    if is_trial or known >= params.most or (known >= params.least and before % every):
         return normal
     return Normal(readonly([*normal.speeds, speed]), readonly([*normal.settings, at]))
 

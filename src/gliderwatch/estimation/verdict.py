@@ -132,8 +132,8 @@ def _left(shape: Array, across: Array, sigma: Array) -> float:
 # Flag 2: a measurement is wrong. Flag 1: the glider is slower than normal (or faster than configured), at
 # once or by evidence over several dives. No flag: its speed cannot be known from this dive, and why.
 
-DIVES_A_MONTH = 240.0
-"""Dives of 3 h in 30 days."""
+DIVES_A_MONTH, USUAL_DIVE = 240.0, 3 * 3600.0
+"""Dives of 3 h in 30 days, and that time in s: of shorter dives each counts for less."""
 DEPARTURE, SLACK = 0.08, 1.0
 """Part of the usual speed by which a healthy glider's speed varies at least, for the sum of small losses;
 and how many times that does not add to the sum."""
@@ -146,6 +146,7 @@ three to one."""
 FASTER = "faster than ever: the current is wrong, or it is driven harder"
 NEW_FASTER = "faster than before: a new way of flying, or the current is wrong: the next dives will tell"
 NEW_SLOWER = "slower than before, after a change of pitch or ballast: the next dives will tell"
+NEW_WAY = "flies in a new way for three dives: "
 HIDDEN = 0.1
 """Part of the speed that the glider believes, by which it must be slower to be slower than that."""
 ROLLED, ROLLS = 0.12, 5
@@ -210,13 +211,15 @@ class SpeedState:
 class Verdict:
     """What a dive says: ``flag`` (None: nothing) with the ``reason`` in words, the ``normal`` range used, and
     what was found (``info``, None: the dive has no track). ``by_reckoning``: the speed through the water
-    (m/s) and its standard error by depth rate and pitch, where these alone decided."""
+    (m/s) and its standard error by depth rate and pitch, where these alone decided. ``before``: what was the
+    usual speed (m/s) until this dive made another one normal."""
 
     flag: Flag | None
     reason: str
     normal: SpeedRange
     info: JointInfo | None
     by_reckoning: tuple[float, float] | None = None
+    before: float | None = None
 
 
 def step(
@@ -251,10 +254,12 @@ def step(
         if flag is not None and told is not None:
             left = 1 - _usual_slip(params)
             return state, Verdict(flag, reason, normal, info, (told.speed * left, told.sigma * left))
+    known = normal
     state, flag, reason, normal = _regime(state, dive, info, told, normal, flag, reason, params)
+    before = known.usual if reason.startswith(NEW_WAY) else None
     if flag is Flag.NORMAL and not frozen:
         state = replace(_learnt(state, dive, info, at, params), trim=_trim(dive))
-    return state, Verdict(flag, reason, normal, info)
+    return state, Verdict(flag, reason, normal, info, before=before)
 
 
 def _regime(
@@ -286,8 +291,7 @@ def _regime(
     at = setting(dive.features)
     state = replace(state, normal=renewed(state.normal, row, at), other=(), slow=0.0, doubted=0)
     new = speed_range(state.normal, at, learning) or normal
-    words = f"flies in a new way for three dives: {speed:.2f} m/s is its normal speed now, "
-    words += "unless you say otherwise"
+    words = f"{NEW_WAY}{speed:.2f} m/s is its normal speed now, unless you say otherwise"
     return state, Flag.NORMAL, words, new
 
 
@@ -402,7 +406,9 @@ def _small_losses(
     found = info.estimate
     # a dive that hardly tells the speed adds little, and no dive alone is several
     departure = (1 - found.speed / normal.usual) / max(DEPARTURE, found.own_sigma / normal.usual)
-    total = min(cusum(state.slow, min(departure, bound / 2 + SLACK), SLACK), bound + SLACK)
+    part = min((info.seen.end - info.seen.start) / USUAL_DIVE, 1.0)
+    departure = min(departure, bound / 2 + SLACK)
+    total = min(cusum(state.slow, part * departure, part * SLACK), bound + SLACK)
     if departure < SLACK / 2:
         total /= 2  # it flies as usual: what was slow is over soon
     state = replace(state, slow=total)

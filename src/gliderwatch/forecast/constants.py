@@ -80,6 +80,8 @@ WORST_COURSE = 2.0
 """Greatest square of the error of a course that counts: that of one at a right angle."""
 STEADY_HEADING = 0.3
 """Length of the mean heading vector from which the speed of a dive shows."""
+FAR = 1e6
+"""m to the goal of a course of which no waypoint is known: no dive reaches it."""
 MOST_ALLOWANCE = 0.8
 """Sine of the angle that allowance for a current takes at most."""
 FLOORS = (0.03, 0.01, 0.01, 0.01)

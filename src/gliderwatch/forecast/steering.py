@@ -7,15 +7,17 @@ other means as well. Which of it, shows in the dives before.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gliderwatch.forecast.constants import MOST_ALLOWANCE, SLOWEST
+from gliderwatch.forecast.constants import FAR, MOST_ALLOWANCE, SLOWEST, STEADY_HEADING
 from gliderwatch.model import Array
 
 WAYS = ("as before", "beside the waypoint", "at the waypoint", "at the waypoint against the current")
 """The ways of steering, in the order of what is told of them."""
+AGAINST = "on the course before, against the current"
+"""The last of them, where no waypoint is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,9 +25,9 @@ class Plan:
     """What a glider knows of its way at a surfacing.
 
     ``heading`` ((2,), mean vector of the last dive), ``bearing`` (rad, counter-clockwise from east, None: not
-    known) of the waypoint of that dive at its start, ``length`` of the mean heading vector on a straight
-    way; ``current`` (m/s, (2,)) and ``speed`` (m/s) it reckons with; ``goals`` (m, (2,)) from the fix: the
-    waypoint and the one after it, as far as known.
+    known) of the waypoint of that dive at its start, or of the course that it steered, ``length`` of the mean
+    heading vector on a straight way; ``current`` (m/s, (2,)) and ``speed`` (m/s) it reckons with; ``goals``
+    (m, (2,)) from the fix: the waypoint and the one after it, as far as known.
     """
 
     heading: Array
@@ -46,15 +48,35 @@ class Course:
 
 
 def courses(plan: Plan, time: float) -> tuple[Course, ...]:
-    """The course of a dive of that ``time`` (s) by each of `WAYS`; all as before without a waypoint."""
+    """The course of a dive of that ``time`` (s) by each of `WAYS`.
+
+    Without a waypoint it is as before, or against the current on the course that was steered before: with a
+    tide the heading changes from dive to dive, the course does not.
+    """
     before = Course(plan.heading)
     if not plan.goals:
-        return (before,) * len(WAYS)
+        if plan.bearing is None:
+            return (before,) * len(WAYS)
+        far = FAR * np.array([math.cos(plan.bearing), math.sin(plan.bearing)])
+        return before, before, before, _along(replace(plan, goals=(far,)), time, 0.0, against=True)
     beside = 0.0
     if plan.bearing is not None:
         beside = math.atan2(plan.heading[1], plan.heading[0]) - plan.bearing
     aside = before if plan.bearing is None else _along(plan, time, beside, against=False)
     return before, aside, _along(plan, time, 0.0, against=False), _along(plan, time, 0.0, against=True)
+
+
+def steered(heading: Array, speed: float, current: Array) -> float | None:
+    """The course (rad, counter-clockwise from east) that a glider meant to make good on a dive.
+
+    With the mean ``heading`` vector ((2,)) that it steered it reckoned with a ``speed`` through the water and
+    the ``current`` ((2,), both m/s) of the dive before. None where it circled.
+    """
+    length = float(np.hypot(*heading))
+    if length < STEADY_HEADING:
+        return None
+    meant = speed * heading / length + current
+    return math.atan2(meant[1], meant[0])
 
 
 def _along(plan: Plan, time: float, beside: float, against: bool) -> Course:

@@ -42,7 +42,7 @@ from gliderwatch.forecast.constants import (
     WILD_CHANGE,
     WORST_COURSE,
 )
-from gliderwatch.forecast.steering import WAYS, Plan, courses
+from gliderwatch.forecast.steering import AGAINST, WAYS, Plan, courses, steered
 from gliderwatch.forecast.timing import quantile
 from gliderwatch.model import Array, Dive, Fix, NextSurfacing, Segment, Unusable
 from gliderwatch.navigation.flight import joined
@@ -66,8 +66,9 @@ class Surfacings:
     ``drift`` (m/s) in them beside the current. ``heading`` the mean vector of the last dive (None: not
     seen yet), ``lengths`` those of the last ones; ``speed`` (m/s) that the glider believes; ``current``
     (m/s) of the last dive, ``change`` ((m/s)2, a component) the mean square of its changes;
-    ``bearing`` (rad) of the waypoint when that dive began. ``waypoints`` in order, the present one last;
-    ``scores`` of the ways of steering, mean square errors of their courses; ``misses``, see `factor`.
+    ``bearing`` (rad) of the waypoint when that dive began, else of the course that it steered.
+    ``waypoints`` in order, the present one last; ``scores`` of the ways of steering, mean square errors of
+    their courses; ``misses``, see `factor`.
     """
 
     fix: Fix | None = None
@@ -130,27 +131,27 @@ def factor(misses: Sequence[float]) -> float:
 # Which waypoint a glider was bound for when it came up.
 
 WaypointLog = tuple[tuple[float, float, float], ...]
-"""Waypoints as they were told: time (s), latitude and longitude (degrees), in order of time."""
+"""Waypoints as they were reported: time (s), latitude and longitude (degrees), in order of time."""
 
 
-def read_waypoints(known: WaypointLog, segment: Segment) -> WaypointLog:
-    """The waypoints told until now and those in one more segment; what changes nothing is left out."""
+def read_waypoints(before: WaypointLog, segment: Segment) -> WaypointLog:
+    """The waypoints reported until now and those in one more segment; what changes nothing is left out."""
     t, lat, lon = joined(segment.get("waypoint_lat"), segment.get("waypoint_lon"))
-    told = zip(t.tolist(), lat.tolist(), lon.tolist(), strict=True)
+    reported = zip(t.tolist(), lat.tolist(), lon.tolist(), strict=True)
     out: list[tuple[float, float, float]] = []
-    for report in sorted({*known, *told}):
+    for report in sorted({*before, *reported}):
         if not out or report[1:] != out[-1][1:]:
             out.append(report)
     return tuple(out[-WAYPOINTS_HEARD:])
 
 
-def active_waypoint(known: WaypointLog, t: float) -> Place | None:
-    """The waypoint at a fix at time ``t`` (s), of those told; None before any.
+def active_waypoint(log: WaypointLog, t: float) -> Place | None:
+    """The waypoint at a fix at time ``t`` (s), of those reported; None before any.
 
     >>> active_waypoint(((0.0, 27.0, -84.0), (9000.0, 27.5, -84.0)), 8000.0)
     (27.0, -84.0)
     """
-    before = [(lat, lon) for told, lat, lon in known if told <= t + WAYPOINT_LATE]
+    before = [(lat, lon) for reported, lat, lon in log if reported <= t + WAYPOINT_LATE]
     return before[-1] if before else None
 
 
@@ -164,8 +165,8 @@ def learn(
     """The state after one more dive; one that has not ended changes nothing.
 
     Dives come in order; one whose current was corrected is taken again from the state before it.
-    ``waypoint`` (degrees) is the last one told until now; ``expected`` what was made of ``state``, with which
-    the ellipse is calibrated (None: nothing was). A new deployment begins anew.
+    ``waypoint`` (degrees) is the last one reported until now; ``expected`` what was made of ``state``, with
+    which the ellipse is calibrated (None: nothing was). A new deployment starts from nothing.
     """
     end = dive.end
     if end is None:
@@ -180,6 +181,10 @@ def learn(
         waypoints=_waypoints(state.waypoints, waypoint),
         fix=end,
     )
+    if after.bearing is None and state.current is not None and state.speed is not None:
+        flown = _flown(after, dive).heading if dive.track is not None else None
+        course = None if flown is None else steered(np.array(flown), state.speed, np.array(state.current))
+        after = replace(after, bearing=course)
     return _driven(_adrift(_flown(after, dive), state.fix, dive), dive)
 
 
@@ -247,10 +252,10 @@ def _misses(state: Surfacings, dive: Dive, end: Fix, expected: NextSurfacing | N
     return (*state.misses, distance)[-MISSES_KEPT:]
 
 
-def _waypoints(known: tuple[Place, ...], told: Place | None) -> tuple[Place, ...]:
-    if told is None or (known and is_same(known[-1], told)):
+def _waypoints(known: tuple[Place, ...], reported: Place | None) -> tuple[Place, ...]:
+    if reported is None or (known and is_same(known[-1], reported)):
         return known
-    return (*known, told)[-WAYPOINTS_KEPT:]
+    return (*known, reported)[-WAYPOINTS_KEPT:]
 
 
 def _flown(state: Surfacings, dive: Dive) -> Surfacings:
@@ -396,4 +401,7 @@ def _heading(state: Surfacings, speed: float, flow: Array, dive: float) -> tuple
     unknown = np.array([course.unknown for course in made])
     own = float(weights @ (scores + unknown**2)) / 2
     cov = np.asarray((weights[:, None] * off).T @ off + own * np.eye(2))
-    return mean, cov, WAYS[int(np.argmax(weights))] if state.waypoints else WAYS[0]
+    best = int(np.argmax(weights))
+    if not state.waypoints:
+        return mean, cov, AGAINST if state.bearing is not None and best == len(WAYS) - 1 else WAYS[0]
+    return mean, cov, WAYS[best]

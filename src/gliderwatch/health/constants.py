@@ -20,6 +20,8 @@ PAUSE = 3 * DAY
 """Seconds without readings after which a glider is on another deployment: nothing usual is carried over."""
 REMEMBERED = 30 * DAY
 """Seconds of readings that rules look back on."""
+REPORTED = 45 * DAY
+"""Seconds of what rules found that incidents are made of: one that is open for longer begins there."""
 
 SURFACE = 2.0
 """Metres above which the glider is at the surface, with its air bladder full."""

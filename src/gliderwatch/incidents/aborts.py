@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
-from gliderwatch.messages import call_text as message
-from gliderwatch.messages.call_text import Told
-from gliderwatch.model import Aborts, Alert, Call, Happened, Happening, Severity
+from gliderwatch.incidents.acknowledgement import Acks, is_taken_on
+from gliderwatch.incidents.notices import Aborted, AbortReport, Notice, Resumed, StillAborted
+from gliderwatch.incidents.send_schedule import next_reminder
+from gliderwatch.model import Aborts, Call, Happened, Happening, Kind, Severity
 
 SAME = 1800.0
 """Seconds: two lines about an abort that are no further apart are about the same one."""
@@ -39,9 +41,9 @@ _LOUDEST = (
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What a `call` told, as it is to be told."""
+    """What a `call` reported, as it is to be reported on."""
 
-    told: Told
+    report: AbortReport
     call: Call
 
 
@@ -51,7 +53,7 @@ class Episode:
     last at ``time`` (s); ``cleared`` when it was in its mission again (s)."""
 
     id: str
-    told: tuple[Told, ...]
+    told: tuple[AbortReport, ...]
     messages: int
     time: float
     cleared: float | None = None
@@ -74,10 +76,10 @@ def findings(calls: Iterable[Call]) -> tuple[Finding, ...]:
                 found.append(Finding(_of_history(aborts, is_first=before is None), call))
             before = aborts
     out: list[Finding] = []
-    for one in sorted(found, key=lambda f: (f.told.is_history, f.told.t, f.call.began)):
-        if not any(_is_same(one.told, other.told) for other in out):
+    for one in sorted(found, key=lambda f: (f.report.is_history, f.report.t, f.call.began)):
+        if not any(_is_same(one.report, other.report) for other in out):
             out.append(one)
-    return tuple(sorted(out, key=lambda f: (f.told.t, f.told.what)))
+    return tuple(sorted(out, key=lambda f: (f.report.t, f.report.what)))
 
 
 def _is_another(before: Aborts, now: Aborts) -> bool:
@@ -87,93 +89,120 @@ def _is_another(before: Aborts, now: Aborts) -> bool:
     return now.count > before.count
 
 
-def _of_history(aborts: Aborts, *, is_first: bool) -> Told:
+def _of_history(aborts: Aborts, *, is_first: bool) -> AbortReport:
     t = aborts.at if aborts.t is None else aborts.t
     is_quiet = is_first or aborts.cause == "USER_INTERRUPT"
     severity = Severity.INFO if is_quiet else Severity.CRITICAL
-    return Told(Happening.ABORTING, t, aborts.cause, severity, is_history=is_first)
+    return AbortReport(Happening.ABORTING, t, aborts.cause, severity, is_history=is_first)
 
 
-def _of_happened(happened: Happened) -> Told:
+def _of_happened(happened: Happened) -> AbortReport:
     is_quiet = happened.cause == "USER_INTERRUPT" or (
         happened.by_pilot and happened.what not in (Happening.EMERGENCY, Happening.WEIGHT_DROPPED)
     )
     severity = Severity.INFO if is_quiet else _SEVERITIES[happened.what]
-    return Told(happened.what, happened.t, happened.cause, severity)
+    return AbortReport(happened.what, happened.t, happened.cause, severity)
 
 
-def _is_same(one: Told, other: Told) -> bool:
+def _is_same(one: AbortReport, other: AbortReport) -> bool:
     return one.what == other.what and abs(one.t - other.t) <= SAME
 
 
 def announce(
-    glider: str, before: tuple[Episode, ...], calls: tuple[Call, ...], now: float
-) -> tuple[tuple[Episode, ...], list[Alert]]:
+    glider: str,
+    before: tuple[Episode, ...],
+    calls: tuple[Call, ...],
+    now: float,
+    acks: Acks = MappingProxyType({}),
+    reminder_hours: float | None = None,
+) -> tuple[tuple[Episode, ...], list[Notice]]:
     """What people have been told of aborts after the messages that are due `now` (s), and these.
 
-    `calls` are those known of the last weeks, in order of time.
+    `calls` are those known of the last weeks, in order of time. Of what nobody has taken on (`acks`) people
+    are reminded after `reminder_hours`.
     """
-    episodes, alerts = list(before), list[Alert]()
+    episodes, notices = list(before), list[Notice]()
     fresh: dict[int, list[Finding]] = {}
     for one in findings(calls):
-        k = _place(episodes, one.told)
-        if now - one.call.last_t >= NEWS or (k is not None and _is_told(episodes[k], one.told)):
+        k = _place(episodes, one.report)
+        if now - one.call.last_t >= NEWS or (k is not None and _is_reported(episodes[k], one.report)):
             continue
         if k is None:
             k = len(episodes)
-            episodes.append(Episode(_identity(glider, one.told, episodes), (), 0, one.told.t))
+            episodes.append(Episode(_identity(glider, one.report, episodes), (), 0, one.report.t))
         was_noted = bool(episodes[k].told) and episodes[k].severity is Severity.INFO
         cleared = None if was_noted else episodes[k].cleared
-        episodes[k] = replace(episodes[k], told=(*episodes[k].told, one.told), cleared=cleared)
+        episodes[k] = replace(episodes[k], told=(*episodes[k].told, one.report), cleared=cleared)
         fresh.setdefault(k, []).append(one)
     for k, new in fresh.items():
-        episodes[k], alert = _spoken(glider, episodes[k], new)
-        alerts.append(alert)
+        episodes[k], notice = _aborted(glider, episodes[k], new)
+        notices.append(notice)
     for k, episode in enumerate(episodes):
         if episode.cleared is None:
             episodes[k], more = _cleared(glider, episode, calls)
-            alerts += more
-    return tuple(episodes), alerts
+            taken_on = k in fresh or is_taken_on(acks, (episode.id,), episode.severity)
+            if not more and reminder_hours is not None and not taken_on:
+                episodes[k], more = _reminded(glider, episode, calls, reminder_hours)
+            notices += more
+    return tuple(episodes), notices
 
 
-def _place(episodes: list[Episode], told: Told) -> int | None:
-    """The episode that something told belongs to: it goes on, or had been told of it; None: a new one."""
+def _place(episodes: list[Episode], report: AbortReport) -> int | None:
+    """The episode that a report belongs to: it goes on, or has had it; None: a new one."""
     for k, episode in enumerate(episodes):
-        if any(_is_same(told, other) for other in episode.told):
+        if any(_is_same(report, other) for other in episode.told):
             return k
     for k, episode in enumerate(episodes):
-        if episode.cleared is None or episode.told[0].t <= told.t <= episode.cleared:
+        if episode.cleared is None or episode.told[0].t <= report.t <= episode.cleared:
             return k
     return None
 
 
-def _is_told(episode: Episode, told: Told) -> bool:
-    """Whether people have been told of it: a prompt that waits is told once, an abort is implied by another
-    word for it."""
-    if told.what is Happening.ABORTING:
-        same = [other for other in episode.told if _is_same(told, other)]
-        return any(told.is_history or not other.is_history for other in same)
-    implied = told.what is Happening.FELL_OUT and any(o.what is Happening.ABORTING for o in episode.told)
-    return implied or any(told.what == other.what for other in episode.told)
+def _is_reported(episode: Episode, report: AbortReport) -> bool:
+    """Whether people have been notified of it: a prompt that waits is reported once, an abort is implied by
+    another word for it."""
+    if report.what is Happening.ABORTING:
+        same = [other for other in episode.told if _is_same(report, other)]
+        return any(report.is_history or not other.is_history for other in same)
+    implied = report.what is Happening.FELL_OUT and any(o.what is Happening.ABORTING for o in episode.told)
+    return implied or any(report.what == other.what for other in episode.told)
 
 
-def _identity(glider: str, told: Told, episodes: list[Episode]) -> str:
-    identity, taken = f"{glider}/abort/{told.t:.0f}", {e.id for e in episodes}
+def _identity(glider: str, report: AbortReport, episodes: list[Episode]) -> str:
+    identity, taken = f"{glider}/abort/{report.t:.0f}", {e.id for e in episodes}
     while identity in taken:
         identity += "+"
     return identity
 
 
-def _spoken(glider: str, episode: Episode, new: list[Finding]) -> tuple[Episode, Alert]:
+def _aborted(glider: str, episode: Episode, new: list[Finding]) -> tuple[Episode, Notice]:
     """The episode after one message about what is new in it, and the message."""
-    told = sorted((one.told for one in new), key=lambda t: (-t.severity, _LOUDEST.index(t.what), t.t))
+    reports = sorted((one.report for one in new), key=lambda r: (-r.severity, _LOUDEST.index(r.what), r.t))
     call = max((one.call for one in new), key=lambda c: c.last_t)
-    alert_id = f"{episode.id}/{episode.messages}"
-    alert = message.aborted(glider, tuple(told), call, alert_id=alert_id, thread=episode.id)
-    return replace(episode, messages=episode.messages + 1, time=call.last_t), alert
+    identity, loud = f"{episode.id}/{episode.messages}", max(report.severity for report in reports)
+    content = Aborted(tuple(reports), call)
+    notice = Notice(identity, episode.id, glider, call.last_t, Kind.ABORT, loud, loud, content)
+    return replace(episode, messages=episode.messages + 1, time=call.last_t), notice
 
 
-def _cleared(glider: str, episode: Episode, calls: tuple[Call, ...]) -> tuple[Episode, list[Alert]]:
+def _reminded(
+    glider: str, episode: Episode, calls: tuple[Call, ...], hours: float
+) -> tuple[Episode, list[Notice]]:
+    """The episode, and the reminder of it that its last call makes due; what was only noted needs none."""
+    since, call = min(one.t for one in episode.told), max(calls, key=lambda c: c.last_t, default=None)
+    if call is None or episode.severity is Severity.INFO:
+        return episode, []
+    before, age = ((t - since) / 3600 / hours for t in (episode.time, call.last_t))
+    if age < next_reminder(before):
+        return episode, []
+    reports = sorted(episode.told, key=lambda r: (-r.severity, _LOUDEST.index(r.what), r.t))
+    content = StillAborted(tuple(reports), call, (call.last_t - since) / 3600)
+    identity, loud = f"{episode.id}/{episode.messages}", episode.severity
+    notice = Notice(identity, episode.id, glider, call.last_t, Kind.REMINDER, loud, loud, content)
+    return replace(episode, messages=episode.messages + 1, time=call.last_t), [notice]
+
+
+def _cleared(glider: str, episode: Episode, calls: tuple[Call, ...]) -> tuple[Episode, list[Notice]]:
     """The episode, and its all-clear once a later call tells of a mission; what was only noted needs none."""
     if episode.severity is Severity.INFO:
         return replace(episode, cleared=episode.time), []
@@ -181,9 +210,10 @@ def _cleared(glider: str, episode: Episode, calls: tuple[Call, ...]) -> tuple[Ep
     call = next((c for c in calls if c.began > since and _is_in_mission(c)), None)
     if call is None:
         return episode, []
-    alert_id = f"{episode.id}/{episode.messages}"
-    alert = message.resumed(glider, call, alert_id=alert_id, thread=episode.id, audience=episode.severity)
-    return replace(episode, messages=episode.messages + 1, time=call.last_t, cleared=call.last_t), [alert]
+    identity, info = f"{episode.id}/{episode.messages}", Severity.INFO
+    to, content = episode.severity, Resumed(call)
+    notice = Notice(identity, episode.id, glider, call.last_t, Kind.ALL_CLEAR, info, to, content)
+    return replace(episode, messages=episode.messages + 1, time=call.last_t, cleared=call.last_t), [notice]
 
 
 def _is_in_mission(call: Call) -> bool:

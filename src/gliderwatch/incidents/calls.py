@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 from gliderwatch.incidents.aborts import NEWS
+from gliderwatch.incidents.acknowledgement import Acks, is_taken_on
 from gliderwatch.incidents.constants import LONGEST_CALL
+from gliderwatch.incidents.notices import CalledWithoutFile, Notice, SendsAgain
 from gliderwatch.incidents.overdue import HOUR, Sign
-from gliderwatch.messages import call_text as message
-from gliderwatch.model import Alert, Call, Severity
+from gliderwatch.model import Call, Kind, Severity
 
 SEVERAL = 2
 """Calls without a file in a row that are a warning; one alone may be a dropped connection."""
@@ -56,11 +58,17 @@ def _is_one(before: list[Call], call: Call) -> bool:
 
 
 def announce(
-    glider: str, before: Empty | None, calls: tuple[Call, ...], signs: tuple[Sign, ...], now: float
-) -> tuple[Empty | None, list[Alert]]:
+    glider: str,
+    before: Empty | None,
+    calls: tuple[Call, ...],
+    signs: tuple[Sign, ...],
+    now: float,
+    acks: Acks = MappingProxyType({}),
+) -> tuple[Empty | None, list[Notice]]:
     """What people have been told of calls without a file after the messages due `now` (s), and these.
 
     `calls` are those known of the last weeks, in order of time; `signs` tells of files that came otherwise.
+    What somebody has taken on (`acks`) is not repeated.
     """
     groups = surfacings(calls)
     over = [g for k, g in enumerate(groups) if k + 1 < len(groups) or _is_over(g, now)]
@@ -80,14 +88,16 @@ def announce(
     is_due = n > state.told and (n <= SEVERAL or n >= 2 * state.told)
     if not is_due or now - run[-1][-1].last_t >= NEWS:
         return before, []
-    severity = Severity.INFO if n < SEVERAL else Severity.WARNING
-    last = tuple(group[-1] for group in run)
-    alert_id = f"{state.id}/{state.messages}"
-    alert = message.without_file(glider, last, alert_id=alert_id, thread=state.id, severity=severity)
-    return replace(state, told=n, messages=state.messages + 1), [alert]
+    loud = Severity.INFO if n < SEVERAL else Severity.WARNING
+    if is_taken_on(acks, (state.id,), loud):
+        return before, []
+    content = CalledWithoutFile(tuple(group[-1] for group in run))
+    identity, time = f"{state.id}/{state.messages}", content.calls[-1].last_t
+    notice = Notice(identity, state.id, glider, time, Kind.CALL, loud, loud, content)
+    return replace(state, told=n, messages=state.messages + 1), [notice]
 
 
-def _over(glider: str, before: Empty | None, groups: list[Surfacing]) -> tuple[Empty | None, list[Alert]]:
+def _over(glider: str, before: Empty | None, groups: list[Surfacing]) -> tuple[Empty | None, list[Notice]]:
     """A file was sent again."""
     later = [] if before is None else [g for g in groups if g[0].began > before.since]
     if before is None or before.is_over or not later:
@@ -95,9 +105,10 @@ def _over(glider: str, before: Empty | None, groups: list[Surfacing]) -> tuple[E
     ended = replace(before, is_over=True)
     if before.told < SEVERAL:
         return ended, []
-    alert_id = f"{before.id}/{before.messages}"
-    alert = message.sends_again(glider, later[-1][-1], alert_id=alert_id, thread=before.id)
-    return replace(ended, messages=before.messages + 1), [alert]
+    identity, call = f"{before.id}/{before.messages}", later[-1][-1]
+    info, to = Severity.INFO, Severity.WARNING
+    notice = Notice(identity, before.id, glider, call.last_t, Kind.ALL_CLEAR, info, to, SendsAgain(call))
+    return replace(ended, messages=before.messages + 1), [notice]
 
 
 def _is_over(surfacing: Surfacing, now: float) -> bool:

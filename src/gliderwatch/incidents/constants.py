@@ -17,6 +17,8 @@ WORSE_FLOW_ERROR = 0.1
 # What is announced
 NEWS = 86400.0
 """s: an incident that was over for longer when it became known is history, not news."""
+REGIME_DIVES = 8
+"""Dives back among which a new way of flying is looked for, one that people do not know: a day of 3 h."""
 SPEED_CHANGE = 0.05
 """m/s: a smaller change of a speed that was announced is not worth a correction."""
 FLOW_CHANGE = 0.05

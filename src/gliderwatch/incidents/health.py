@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from gliderwatch.health.constants import REMEMBERED
 from gliderwatch.health.rule import Finding
 from gliderwatch.health.rules import Judged
 from gliderwatch.incidents.acknowledgement import Acks, is_taken_on
@@ -21,7 +22,7 @@ from gliderwatch.incidents.notices import (
     HealthReminder,
     Notice,
 )
-from gliderwatch.incidents.reminders import next_reminder
+from gliderwatch.incidents.send_schedule import next_reminder
 from gliderwatch.incidents.state_machine import TRANSITIONS, Event, Phase
 from gliderwatch.model import Fix, Kind, Severity
 
@@ -81,7 +82,7 @@ class HealthThread:
 
 @dataclass(frozen=True, slots=True)
 class _Now:
-    """What decides on the notices that are due: the ``latest`` reading (s), the last fix, who took what on."""
+    """What decides on the notices that are due: the ``latest`` reading (s), the last fix, acks."""
 
     latest: float
     fix: Fix | None
@@ -125,7 +126,12 @@ def announce(
                 thread, more = _continued(thread, incident, now)
                 notices += more
             threads.append(thread)
-    return tuple(threads), notices
+    return tuple(t for t in threads if not _is_past(t, now.latest)), notices
+
+
+def _is_past(thread: HealthThread, latest: float) -> bool:
+    """Whether a thread has been over for so long (s) that its incident is no news, whatever data come."""
+    return thread.is_over and latest - thread.time > REMEMBERED
 
 
 def _matched(
@@ -171,8 +177,8 @@ def _continued(
     if hours is not None and not is_taken_on(now.acks, (incident.id, thread.id), incident.severity):
         before, age = ((t - incident.opened_at) / 3600 / hours for t in (thread.time, now.latest))
         if age >= next_reminder(before):
-            content = HealthReminder(incident, (now.latest - incident.since) / 3600, now.fix)
-            return _notified(thread, incident, content, now)
+            reminder = HealthReminder(incident, (now.latest - incident.since) / 3600, now.fix)
+            return _notified(thread, incident, reminder, now)
     return replace(thread, reported=incident), []
 
 

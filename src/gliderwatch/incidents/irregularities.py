@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from gliderwatch.incidents.constants import FRESH, GONE
-from gliderwatch.messages import incident_text
-from gliderwatch.messages.formatting import duration, place, utc
-from gliderwatch.model import Alert, Fix, Severity
-from gliderwatch.navigation.clock import DAY, HOUR, ROLLOVER, ClockStep, numbered, span
+from gliderwatch.incidents.notices import Irregularity, Notice, OldDates, TwoGliders
+from gliderwatch.model import Fix, Kind, Severity
+from gliderwatch.navigation.clock import DAY, HOUR, ClockStep, numbered
 from gliderwatch.navigation.constants import FASTEST_OVER_GROUND
 from gliderwatch.navigation.fixes import distance
 
@@ -25,16 +24,6 @@ ALTERNATIONS = 3
 """Times that a glider is elsewhere and back again: once and twice may be a wild position."""
 FAR = 5000.0
 """Metres: two places nearer than this are not told apart by their speed, so close in time they may be."""
-
-
-@dataclass(frozen=True, slots=True)
-class Irregularity:
-    """One thing that is wrong with the files of a glider since ``t`` (s), under a stable ``id``."""
-
-    id: str
-    t: float
-    title: str
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,62 +50,31 @@ def found(
 
 def due(
     told: Sequence[str], irregularities: Iterable[Irregularity], now: float
-) -> tuple[tuple[str, ...], list[Alert]]:
-    """The ids of those that are told once this is said, and the messages. What is older than 30 days at `now`
-    (s) is history, and nobody is told of it."""
-    ids, alerts = list[str](), list[Alert]()
+) -> tuple[tuple[str, ...], list[Notice]]:
+    """The ids of those that are reported once this is, and the notices to the operator. What is older than 30
+    days at `now` (s) is history, and nobody is notified of it."""
+    ids, notices, loud = list[str](), list[Notice](), Severity.WARNING
     for each in irregularities:
         if each.id not in told and now - each.t < GONE:
-            alerts.append(
-                incident_text.operator(
-                    each.title,
-                    each.text,
-                    each.t,
-                    alert_id=each.id,
-                    severity=Severity.WARNING,
-                    audience=Severity.WARNING,
-                )
-            )
+            notices.append(Notice(each.id, "", "", each.t, Kind.OPERATOR, loud, loud, each))
         if each.id in told or now - each.t < GONE:
             ids.append(each.id)
-    return tuple(ids), alerts
+    return tuple(ids), notices
 
 
 # ------------------------------------------------------------------- the clock
 
 
 def _clock(step: ClockStep) -> Irregularity:
-    size = span(abs(step.step))
-    if step.step < 0:
-        title = f"the clock of {step.glider} is right again"
-        text = f"It was {size} behind until {utc(step.t)}. Nothing is corrected from {step.segment} on."
-    elif step.is_corrected:
-        title = f"the clock of {step.glider} fell back by {size}"
-        text = (
-            f"By its number segment {step.segment} follows the one before, so it opened about "
-            f"{utc(step.t)}; its own times are {size} earlier. {_why(step.step)}\n"
-            "Its dives, and those that follow, are put on the right time and assessed as before. A note "
-            "with each says so.\n"
-            "What to do: set the glider's clock when it calls next, and see what its log says of the time."
-        )
-    else:
-        title = f"the clock of {step.glider} fell back, by how much is not known"
-        text = (
-            f"Segment {step.segment} has a higher number than those before, but its times are at least "
-            f"{size} earlier. {_why(step.step)}\n"
-            "Segments before it are missing, so the right time is not known. Its dives are kept apart, "
-            "under the dates that the glider gave, until the missing files come.\n"
-            "What to do: set the glider's clock when it calls next, and have the missing files sent again."
-        )
     kind = "right" if step.step < 0 else "corrected" if step.is_corrected else "apart"
-    return Irregularity(f"clock/{step.glider}/{step.segment}/{kind}", step.t, title, text)
+    return Irregularity(f"clock/{step.glider}/{step.segment}/{kind}", step.glider, step.t, step)
 
 
 def _old_dates(glider: str, comings: Sequence[Coming], known: set[str]) -> Iterator[Irregularity]:
     """Missions that come while the glider is watched, and of which every file is days old.
 
-    After a restart with a wrong clock the numbers of segments tell nothing. Of missions with `known` steps
-    all is said.
+    After a restart with a wrong clock the numbers of segments say nothing. Missions with `known` steps are
+    reported as these.
     """
     missions: dict[str, list[Coming]] = {}
     for coming in comings:
@@ -125,25 +83,8 @@ def _old_dates(glider: str, comings: Sequence[Coming], known: set[str]) -> Itera
         first = there[0]
         if mission in known or first.at - first.watched < DAY or any(c.at - c.t < FRESH for c in there):
             continue
-        size = span(round((first.at - first.t) / DAY) * DAY)
-        yield Irregularity(
-            f"old-dates/{glider}/{mission}",
-            first.at,
-            f"files of {glider} are dated {size} before they came",
-            f"The first of mission {mission} came {utc(first.at)}: {first.segment}, of {utc(first.t)}. "
-            "Either the glider has a wrong clock, or somebody has put old files into its folder.\n"
-            "Its dives are kept apart, under the dates that the glider gave; the glider counts as heard.\n"
-            "What to do: set the glider's clock when it calls next. If the files are old, nothing.",
-        )
-
-
-def _why(step: float) -> str:
-    if step == ROLLOVER:
-        return (
-            "1024 weeks are the period after which GPS counts its weeks from 0 again: the receiver's "
-            "firmware is too old to know the present one."
-        )
-    return "The clock was set, or lost its time in a restart."
+        what = OldDates(mission, first.segment, first.at, first.t)
+        yield Irregularity(f"old-dates/{glider}/{mission}", glider, first.at, what)
 
 
 # ------------------------------------------------------- two gliders, one name
@@ -159,16 +100,9 @@ def _two_gliders(glider: str, places: Sequence[Fix]) -> Irregularity | None:
     if len(there) < ALTERNATIONS:
         return None
     a, b = there[0]
-    apart, between = distance(a, b) / 1000, duration(max(b.t - a.t, 60.0))
-    return Irregularity(
-        f"two-gliders/{glider}/{datetime.fromtimestamp(places[-1].t, UTC):%Y-%m}",
-        a.t,
-        f"files of two gliders come under the name {glider}",
-        f"Its positions alternate between {place(a.lat, a.lon)} and {place(b.lat, b.lon)}, "
-        f"{apart:.0f} km apart within {between}: no glider flies so fast. None of its dives can be trusted.\n"
-        "What to do: see which other glider has this name in the header of its files (a simulator, a glider "
-        "on the bench, a copied autoexec.mi), and keep its files out of this folder.",
-    )
+    month = datetime.fromtimestamp(places[-1].t, UTC)
+    identity = f"two-gliders/{glider}/{month:%Y-%m}"
+    return Irregularity(identity, glider, a.t, TwoGliders(a, b, distance(a, b)))
 
 
 def _is_too_far(a: Fix, b: Fix) -> bool:

@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from math import ceil
 from types import MappingProxyType
 from typing import Protocol
 
+from gliderwatch.fleet.advice import Advice
 from gliderwatch.incidents.aborts import Episode
-from gliderwatch.incidents.acknowledgement import Acks
-from gliderwatch.incidents.calls import Empty
-from gliderwatch.incidents.constants import FLOW_CHANGE, MARKS, NEWS, SLACK, SPEED_CHANGE, WEEK
+from gliderwatch.incidents.acknowledgement import Acks, is_taken_on
+from gliderwatch.incidents.calls import SEVERAL, Empty
+from gliderwatch.incidents.constants import FLOW_CHANGE, NEWS, REGIME_DIVES, SPEED_CHANGE
+from gliderwatch.incidents.health import HealthThread
+from gliderwatch.incidents.notices import Cleared, Corrected, NewRegime, Notice, Opened, StillOpen, Surfaced
 from gliderwatch.incidents.overdue import Silence
+from gliderwatch.incidents.send_schedule import next_reminder
 from gliderwatch.incidents.unjudged import Unknown
-from gliderwatch.messages import incident_text
-from gliderwatch.model import Alert, Assessment, Incident, NextSurfacing
+from gliderwatch.model import Assessment, Incident, Kind, NextSurfacing, Severity
 
 # ----------------------------------------
 # What people have been told, compared with what is known: the messages that are due. Pure.
@@ -48,7 +50,8 @@ class NotificationState:
         ``surfaced`` is the surfacing of the last notice (s), ``silences`` what was sent of its staying away
     (`incidents.overdue`), ``unknown`` of dives that could not be judged (`incidents.unjudged`), ``aborts`` of
     aborts (`incidents.aborts`), ``empty`` of calls without a file (`incidents.calls`), ``irregularities`` the
-    ids of those of its files.
+    ids of those of its files, ``renewed`` the dive (s) of the last notice of a new way of flying, ``health``
+    of what the rules of health found (`incidents.health`).
     """
 
     threads: tuple[Thread, ...] = ()
@@ -58,6 +61,8 @@ class NotificationState:
     aborts: tuple[Episode, ...] = ()
     empty: Empty | None = None
     irregularities: tuple[str, ...] = ()
+    renewed: float | None = None
+    health: tuple[HealthThread, ...] = ()
 
 
 class IncidentFacts(Protocol):
@@ -82,17 +87,19 @@ def due_notifications(
     reminder_hours: float | None,
     notices: bool,
     acks: Acks = NO_ACKS,
-) -> tuple[NotificationState, list[Alert]]:
+    advice: tuple[tuple[str, Advice], ...] = (),
+) -> tuple[NotificationState, list[Notice]]:
     """The messages to send now, and what will have been said then.
 
     `notices`: whether anyone wants a notice of each surfacing. An incident that somebody has acknowledged
-    (`acks`) is not brought to mind, unless it has grown worse since.
+    (`acks`) is not brought to mind, unless it has grown worse since. `advice`: where to look next, by the
+    name of the field.
     """
     latest = known.last_surfacing(float("inf"))
     if latest is None:
         return said, []
     threads: list[Thread] = []
-    alerts: list[Alert] = []
+    alerts: list[Notice] = []
     incidents = known.incidents()
     matched = _matched(said.threads, incidents)
     for before in said.threads:
@@ -107,6 +114,8 @@ def due_notifications(
             thread, more = _begun(incident, known, latest, {t.id for t in threads})
             threads.append(thread)
             alerts += more
+    renewed, more = _new_regime(said.renewed, known, latest)
+    alerts += more
     surfaced = said.surfaced
     if notices and _is_another(latest, surfaced):
         identity = f"{latest.glider}/surfacing/{latest.t_dive:.0f}"
@@ -115,10 +124,41 @@ def due_notifications(
         expected = known.expected(float("inf"))
         if expected is not None and expected.after < latest.t_surface:
             expected = None  # of an earlier surfacing: the last dive cannot be used
-        alerts.append(incident_text.surfacing(latest, previous, alert_id=identity, expected=expected))
+        content = Surfaced(latest, previous, expected, advice)
+        info = Severity.INFO
+        alerts.append(
+            Notice(identity, "", latest.glider, latest.t_surface, Kind.SURFACING, info, info, content)
+        )
         surfaced = latest.t_surface
-    said = replace(said, threads=tuple(threads), surfaced=surfaced)
+    said = replace(said, threads=tuple(threads), surfaced=surfaced, renewed=renewed)
     return said, sorted(alerts, key=lambda a: a.time)
+
+
+def _new_regime(
+    renewed: float | None, known: IncidentFacts, latest: Assessment
+) -> tuple[float | None, list[Notice]]:
+    """The dive (s) whose new way of flying people were told of, and the notice of one that is news.
+
+    Files may have come together: it is looked for among the last `REGIME_DIVES`.
+    """
+    dives = [latest]
+    for _ in range(REGIME_DIVES):
+        earlier = known.last_surfacing(dives[-1].t_surface - 1.0)
+        if earlier is None:
+            break
+        dives.append(earlier)
+    for k, dive in enumerate(dives):
+        before = dive.evidence.get("usual_before")
+        if renewed is not None and dive.t_dive <= renewed:
+            break
+        if before is not None and dive.speed is not None and latest.t_surface - dive.t_surface < NEWS:
+            since = dives[min(k + 2, len(dives) - 1)].t_dive
+            identity = f"{dive.glider}/regime/{dive.t_dive:.0f}"
+            content, at = NewRegime(dive, before, since), dive.t_surface
+            severity, audience = Severity.INFO, Severity.WARNING
+            notice = Notice(identity, "", dive.glider, at, Kind.REGIME, severity, audience, content)
+            return dive.t_dive, [notice]
+    return renewed, []
 
 
 def unacknowledged(said: NotificationState, incidents: tuple[Incident, ...], acks: Acks) -> frozenset[str]:
@@ -134,10 +174,41 @@ def unacknowledged(said: NotificationState, incidents: tuple[Incident, ...], ack
     }
     if said.unknown is not None and not said.unknown.is_over:
         threads.add(said.unknown.id)
-    threads |= {episode.id for episode in said.aborts if episode.cleared is None}
-    if said.empty is not None and not said.empty.is_over:
-        threads.add(said.empty.id)
+    threads |= {t.id for t in open_threads(said) if not is_taken_on(acks, (t.id,), t.severity)}
     return frozenset(threads | {silence.id for silence in said.silences if silence.called is None})
+
+
+@dataclass(frozen=True, slots=True)
+class OpenThread:
+    """What goes on and is no incident of dives: an abort, calls without a file, what a rule of health found.
+
+    ``since`` (s); ``about`` in a few words.
+    """
+
+    id: str
+    kind: Kind
+    severity: Severity
+    since: float
+    about: str
+
+
+def open_threads(said: NotificationState) -> tuple[OpenThread, ...]:
+    """The aborts, calls without a file and findings of health that were reported and go on."""
+    aborts = (
+        OpenThread(e.id, Kind.ABORT, e.severity, e.told[0].t, e.told[0].cause or str(e.told[0].what))
+        for e in said.aborts
+        if e.cleared is None and e.told
+    )
+    health = (
+        OpenThread(t.id, Kind.HEALTH, t.reported.severity, t.reported.since, t.reported.last.text)
+        for t in said.health
+        if not t.is_over
+    )
+    empty, found = said.empty, list[OpenThread]()
+    if empty is not None and not empty.is_over:
+        severity = Severity.INFO if empty.told < SEVERAL else Severity.WARNING
+        found = [OpenThread(empty.id, Kind.CALL, severity, empty.since, f"{empty.told} without a file")]
+    return (*aborts, *found, *health)
 
 
 def as_notified(said: NotificationState, known: IncidentFacts) -> NotificationState:
@@ -164,7 +235,7 @@ def as_notified(said: NotificationState, known: IncidentFacts) -> NotificationSt
     for i in incidents:
         if i.id not in old and i.cleared_at is not None and _is_news(i, latest):
             threads.append(Thread(i.id, i, i.last, 0, latest.t_surface))
-    return replace(said, threads=tuple(threads))
+    return replace(said, threads=tuple(threads), renewed=latest.t_dive)
 
 
 def _is_acknowledged(thread: Thread, now: Incident, acks: Acks) -> bool:
@@ -205,28 +276,23 @@ def _is_news(incident: Incident, latest: Assessment) -> bool:
 
 def _begun(
     incident: Incident, known: IncidentFacts, latest: Assessment, taken: set[str]
-) -> tuple[Thread, list[Alert]]:
+) -> tuple[Thread, list[Notice]]:
     identity = incident.id
     while identity in taken:
         identity += "+"
-    alert = incident_text.opened(
-        incident, incident.last, alert_id=f"{identity}/0", audience=incident.severity
-    )
-    alerts = [replace(alert, incident=identity)]
-    thread = Thread(identity, incident, incident.last, 1, latest.t_surface)
+    thread = Thread(identity, incident, incident.last, 0, latest.t_surface)
+    thread, alerts = _message(thread, Opened(incident, incident.last), latest)
     if incident.cleared_at is not None:
-        others = _still_open(incident, known)
-        thread, more = _message(
-            thread, incident, _clearing(incident, known), latest, "all_clear", others=others
-        )
+        thread, more = _message(thread, _cleared(incident, known), latest)
         alerts += more
     return thread, alerts
 
 
-def _clearing(incident: Incident, known: IncidentFacts) -> Assessment:
-    """The dive that cleared an incident."""
+def _cleared(incident: Incident, known: IncidentFacts) -> Cleared:
+    """That an incident is over, with the dive that cleared it and the incidents that go on."""
     dive = known.last_surfacing(incident.cleared_at if incident.cleared_at is not None else float("inf"))
-    return dive if dive is not None else incident.last
+    others = tuple(i for i in known.incidents() if i.id != incident.id and i.cleared_at is None)
+    return Cleared(incident, dive if dive is not None else incident.last, others)
 
 
 def _continued(
@@ -235,38 +301,27 @@ def _continued(
     known: IncidentFacts,
     latest: Assessment,
     reminder_hours: float | None,
-) -> tuple[Thread, list[Alert]]:
+) -> tuple[Thread, list[Notice]]:
     """One thread after what is known now, and its messages."""
     dive = known.dive(thread.dive.t_dive) or known.last_surfacing(thread.dive.t_surface) or latest
     if now is None:
         if thread.withdrawn:
             return thread, []
-        told, alerts = _message(thread, None, dive, latest, "correction", _why(thread, dive))
+        content = Corrected(thread.told, None, dive, _why(thread, dive))
+        told, alerts = _message(thread, content, latest)
         return replace(told, withdrawn=True), alerts
     was_clear, is_clear = thread.told.cleared_at is not None, now.cleared_at is not None
     if is_clear and not was_clear and not thread.withdrawn:
-        return _message(
-            thread, now, _clearing(now, known), latest, "all_clear", others=_still_open(now, known)
-        )
+        return _message(thread, _cleared(now, known), latest)
     moved = now.since != thread.told.since or now.cleared_at != thread.told.cleared_at
     if moved or thread.withdrawn or _changed(thread.dive, dive):
-        return _message(thread, now, dive, latest, "correction", _why(thread, dive))
+        return _message(thread, Corrected(thread.told, now, dive, _why(thread, dive)), latest)
     if not is_clear and reminder_hours is not None:
         before, age = ((t - now.opened_at) / 3600 / reminder_hours for t in (thread.time, latest.t_surface))
         if age >= next_reminder(before):
-            return _message(thread, now, latest, latest, "reminder")
+            hours = (latest.t_surface - now.since) / 3600
+            return _message(thread, StillOpen(now, latest, hours), latest)
     return thread, []
-
-
-def next_reminder(age: float) -> float:
-    """The age (days, or what is set in their place) at which an incident is brought to mind that was last
-    told of at an ``age``: at 1, 2, 4 and 7 days, then each week, and never within a day of that.
-
-    >>> [next_reminder(age) for age in (0.0, 0.5, 1.0, 2.1, 4.2, 7.0)]
-    [1.0, 2.0, 2.0, 4.0, 7.0, 14.0]
-    """
-    soonest = age + 1 - SLACK
-    return next((mark for mark in MARKS if mark >= soonest), WEEK * max(ceil(soonest / WEEK), 1))
 
 
 def _changed(told: Assessment, now: Assessment) -> bool:
@@ -288,32 +343,20 @@ def _why(thread: Thread, now: Assessment) -> str:
     return "data that came late changed the dives before"
 
 
-def _still_open(incident: Incident, known: IncidentFacts) -> tuple[Incident, ...]:
-    """The other incidents of the glider that go on."""
-    return tuple(i for i in known.incidents() if i.id != incident.id and i.cleared_at is None)
-
-
 def _message(
-    thread: Thread,
-    now: Incident | None,
-    dive: Assessment,
-    latest: Assessment,
-    what: str,
-    why: str = "",
-    others: tuple[Incident, ...] = (),
-) -> tuple[Thread, list[Alert]]:
-    """The thread after one more message, about a `dive`, and the message."""
-    alert_id, audience = f"{thread.id}/{thread.messages}", thread.told.severity
-    if what == "correction":
-        alert = incident_text.correction(thread.told, now, dive, why, alert_id=alert_id, audience=audience)
-    elif what == "all_clear" and now is not None:
-        alert = incident_text.all_clear(now, dive, alert_id=alert_id, audience=audience, others=others)
-    else:
-        assert now is not None
-        hours = (dive.t_surface - now.since) / 3600
-        alert = incident_text.reminder(now, dive, hours, alert_id=alert_id, audience=audience)
-    told = Thread(thread.id, now or thread.told, dive, thread.messages + 1, latest.t_surface)
-    return told, [replace(alert, incident=thread.id)]
+    thread: Thread, content: Opened | StillOpen | Cleared | Corrected, latest: Assessment
+) -> tuple[Thread, list[Notice]]:
+    """The thread after one more message, and the message."""
+    dive, before = content.dive, thread.told
+    now = content.now if isinstance(content, Corrected) else content.incident
+    severity = Severity.INFO if now is None or isinstance(content, Cleared) else now.severity
+    kinds = {StillOpen: Kind.REMINDER, Cleared: Kind.ALL_CLEAR, Corrected: Kind.CORRECTION}
+    kind = kinds.get(type(content), before.kind)
+    identity = f"{thread.id}/{thread.messages}"
+    notice = Notice(
+        identity, thread.id, dive.glider, dive.t_surface, kind, severity, before.severity, content
+    )
+    return Thread(thread.id, now or before, dive, thread.messages + 1, latest.t_surface), [notice]
 
 
 # ----------------------------------------

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import atan2, degrees, exp, inf, sqrt
+from math import atan2, degrees, exp, inf, isfinite, sqrt
 from statistics import median_low
 from typing import Protocol
 
@@ -30,9 +30,17 @@ from gliderwatch.incidents.constants import (
     TIME_SIGMAS,
     UNKNOWN_FLOW,
 )
-from gliderwatch.messages import overdue_text as message
-from gliderwatch.messages.overdue_text import Absence, DriftEllipse, Fleet
-from gliderwatch.model import Alert, Assessment, Incident, NextSurfacing, Severity
+from gliderwatch.incidents.notices import (
+    Absence,
+    CalledAgain,
+    CalledInTime,
+    Content,
+    DriftEllipse,
+    Fleet,
+    Notice,
+    Overdue,
+)
+from gliderwatch.model import Assessment, Incident, Kind, NextSurfacing, Severity
 from gliderwatch.navigation.geodesy import from_plane, to_plane
 from gliderwatch.sea.gauss_markov import FlowParams
 
@@ -274,9 +282,9 @@ class SilenceFacts(Protocol):
 
 def on_calls(
     silences: tuple[Silence, ...], known: SilenceFacts, now: float
-) -> tuple[tuple[Silence, ...], list[Alert]]:
+) -> tuple[tuple[Silence, ...], list[Notice]]:
     """All-clears and corrections for silences that have ended, as known at `now` (s)."""
-    out, alerts = [], list[Alert]()
+    out, alerts = [], list[Notice]()
     for before in silences:
         silence, alert = _on_calls(before, known, now)
         out.append(silence)
@@ -284,7 +292,7 @@ def on_calls(
     return tuple(out), alerts
 
 
-def _on_calls(before: Silence, known: SilenceFacts, now: float) -> tuple[Silence, Alert | None]:
+def _on_calls(before: Silence, known: SilenceFacts, now: float) -> tuple[Silence, Notice | None]:
     if before.withdrawn:
         return before, None
     call = before.awaited
@@ -294,32 +302,22 @@ def _on_calls(before: Silence, known: SilenceFacts, now: float) -> tuple[Silence
     if not before.messages:  # nobody was told of this one
         return replace(before, called=at, withdrawn=at <= call.due), None
     silence = replace(before, messages=before.messages + 1, called=at, withdrawn=at <= call.due)
-    identity, to = f"{before.id}/{before.messages}", _audience(before)
     if silence.withdrawn:
-        return silence, message.withdrawn(
-            known.glider, call.due, at, now, alert_id=identity, thread=before.id, to=to
-        )
-    dive = known.last_surfacing(now)
-    return silence, message.called(
-        known.glider,
-        call.heard,
-        at,
-        dive,
-        alert_id=identity,
-        thread=before.id,
-        to=to,
-        shore=before.shore == before.id,
-    )
+        return silence, _notice(before, known.glider, now, Kind.CORRECTION, CalledInTime(call.due, at))
+    content = CalledAgain(call.heard, at, known.last_surfacing(now), before.shore == before.id)
+    return silence, _notice(before, known.glider, at, Kind.ALL_CLEAR, content)
 
 
-def _audience(silence: Silence) -> Severity:
-    return severity(silence.told - 1)
+def _notice(before: Silence, glider: str, time: float, kind: Kind, content: Content) -> Notice:
+    """That a silence is over, to whom was notified of it."""
+    identity = f"{before.id}/{before.messages}"
+    return Notice(identity, before.id, glider, time, kind, Severity.INFO, severity(before.told - 1), content)
 
 
 def tick(
     silences: tuple[Silence, ...], known: SilenceFacts, fleet: Fleet, overdue_hours: float | None, now: float
-) -> tuple[tuple[Silence, ...], list[Alert]]:
-    """As `hear`, and what has become due by `now` (s).
+) -> tuple[tuple[Silence, ...], list[Notice]]:
+    """As `on_calls`, and what has become due by `now` (s).
 
     Where no glider calls, the message of the first that is due is for all of them: the others have none of
     their own while that goes on, nor for a margin after one calls again.
@@ -336,12 +334,16 @@ def tick(
         return (*kept, replace(silence, told=stages, shore=fleet.shore)), alerts
     since = silence.awaited.stage(stages - 1)
     absence = _absence(silence.awaited, known, fleet, since if now - since < MESSAGE_LATE else now)
-    alert = message.overdue(
-        absence,
-        alert_id=f"{silence.id}/{silence.messages}",
-        thread=silence.id,
-        severity=severity(stages - 1),
-        first=silence.messages == 0,
+    first, loud = silence.messages == 0, severity(stages - 1)
+    alert = Notice(
+        f"{silence.id}/{silence.messages}",
+        silence.id,
+        known.glider,
+        absence.now,
+        Kind.OVERDUE if first else Kind.REMINDER,
+        loud,
+        loud,
+        Overdue(absence, first),
     )
     shore = silence.id if fleet.is_silent else ""
     told = replace(silence, told=stages, messages=silence.messages + 1, shore=shore)
@@ -402,7 +404,7 @@ def _absence(call: ExpectedCall, known: SilenceFacts, fleet: Fleet, now: float) 
     if expected is None:
         expected = NextSurfacing(call.heard, call.t, 0.0, None, None, 0.0, 0.0, 0.0, "")
     place = _both(last.lat, last.lon) if last is not None else None
-    flow = _both(*message.current(last)) if last is not None else None
+    flow = _current(last) if last is not None else None
     foreseen = expected if call.heard <= expected.after + LATER_CALL * call.interval else None
     return Absence(
         glider=known.glider,
@@ -413,10 +415,17 @@ def _absence(call: ExpectedCall, known: SilenceFacts, fleet: Fleet, now: float) 
         lon=foreseen.lon if foreseen is not None else None,
         area=drift(expected, place, flow, now),
         last=last,
+        flow=flow,
         incidents=tuple(i for i in known.incidents() if i.cleared_at is None),
         fleet=fleet,
     )
 
 
+def _current(dive: Assessment) -> tuple[float, float] | None:
+    """The last known current (east, north; m/s) of a dive: the estimated one, else the reference."""
+    estimated = _both(dive.flow_u, dive.flow_v)
+    return _both(dive.reference_u, dive.reference_v) if estimated is None else estimated
+
+
 def _both(a: float | None, b: float | None) -> tuple[float, float] | None:
-    return None if a is None or b is None else (a, b)
+    return (a, b) if a is not None and b is not None and isfinite(a) and isfinite(b) else None

@@ -20,10 +20,9 @@ from gliderwatch.incidents.constants import (
     THINNED,
     UNJUDGED_INTERVALS,
 )
+from gliderwatch.incidents.notices import Blind, Blindness, JudgedAgain, Notice, Unjudged
 from gliderwatch.incidents.overdue import HOUR, Sign, is_at_sea, rhythm
-from gliderwatch.messages import unjudged_text as message
-from gliderwatch.messages.unjudged_text import Blindness, Unjudged
-from gliderwatch.model import Alert, NextSurfacing, Unusable
+from gliderwatch.model import Kind, NextSurfacing, Severity, Unusable
 from gliderwatch.navigation.constants import SHORTEST_DIVE
 from gliderwatch.params import Attention
 
@@ -123,28 +122,34 @@ def _dives(items: tuple[Unjudged, ...]) -> int:
 
 def announce(
     before: Unknown | None, known: Known, attention: Attention, reminder_hours: float | None, now: float
-) -> tuple[Unknown | None, list[Alert]]:
+) -> tuple[Unknown | None, list[Notice]]:
     """What people have been told after the messages that are due `now` (s), and these."""
     found = blindness(known, attention, now)
     if before is None or before.is_over:
         return (before, []) if found is None else _begun(before, found)
-    identity = f"{before.id}/{before.messages}"
     at = known.judged(now)
     if at is not None and at > before.since and found is None:
-        alert = message.judged(known.glider, before.since, at, alert_id=identity, thread=before.id)
-        return replace(before, messages=before.messages + 1, time=at, is_over=True), [alert]
+        identity, content = f"{before.id}/{before.messages}", JudgedAgain(before.since, at)
+        info, to = Severity.INFO, Severity.WARNING
+        notice = Notice(identity, before.id, known.glider, at, Kind.ALL_CLEAR, info, to, content)
+        return replace(before, messages=before.messages + 1, time=at, is_over=True), [notice]
     if found is None or reminder_hours is None:
         return before, []
     pause = min(REMINDER_GROWTH ** (before.messages - 1), THINNED) * reminder_hours * HOUR
     if found.until - before.time < pause:
         return before, []
-    alert = message.blind(found, alert_id=identity, thread=before.id, first=False)
-    return replace(before, messages=before.messages + 1, time=found.until), [alert]
+    return _notified(before, found)
 
 
-def _begun(before: Unknown | None, found: Blindness) -> tuple[Unknown, list[Alert]]:
+def _begun(before: Unknown | None, found: Blindness) -> tuple[Unknown, list[Notice]]:
     identity = f"{found.glider}/unknown/{found.since:.0f}"
     if before is not None and before.id.rstrip("+") == identity:
         identity = before.id + "+"
-    alert = message.blind(found, alert_id=f"{identity}/0", thread=identity, first=True)
-    return Unknown(identity, found.since, 1, found.until), [alert]
+    return _notified(Unknown(identity, found.since, 0, found.until), found)
+
+
+def _notified(before: Unknown, found: Blindness) -> tuple[Unknown, list[Notice]]:
+    first, loud = before.messages == 0, Severity.WARNING
+    identity, kind = f"{before.id}/{before.messages}", Kind.UNKNOWN if first else Kind.REMINDER
+    notice = Notice(identity, before.id, found.glider, found.until, kind, loud, loud, Blind(found, first))
+    return replace(before, messages=before.messages + 1, time=found.until), [notice]

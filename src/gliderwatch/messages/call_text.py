@@ -6,11 +6,18 @@ The same form as `messages.incident_text`: what and how bad, since when, where, 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
-from gliderwatch.messages.formatting import clean, map_link, place, utc
-from gliderwatch.messages.template import Page
-from gliderwatch.model import Alert, Call, Happening, Kind, Severity
+from gliderwatch.incidents.notices import (
+    Aborted,
+    AbortReport,
+    CalledWithoutFile,
+    Resumed,
+    SendsAgain,
+    StillAborted,
+)
+from gliderwatch.messages.formatting import clean, duration, map_link, place, utc
+from gliderwatch.messages.template import Page, Text
+from gliderwatch.model import Call, Happening
 
 CAUSES = {
     "BEH_ERROR": "error in a behaviour",
@@ -50,48 +57,42 @@ _WORDS = {
         "its emergency weight is dropped: it can not dive any more",
     ),
 }
-"""Title and sentence of what a glider told."""
+"""Title and sentence of what a glider report."""
 
 
-@dataclass(frozen=True, slots=True)
-class Told:
-    """One thing that a glider told in a call: what, when (``t``, s), its ``cause``; how loud that is.
-
-    ``is_history`` where the first log that is known shows it: nobody knows whether it was dealt with.
-    """
-
-    what: Happening
-    t: float
-    cause: str
-    severity: Severity
-    is_history: bool = False
-
-
-def aborted(glider: str, told: tuple[Told, ...], call: Call, *, alert_id: str, thread: str) -> Alert:
-    """The glider `told` (at least one, the loudest first) in its last `call` that something is wrong."""
-    main, name = told[0], clean(glider, 40)
-    title = f"{name} {_title(main)}"
+def aborted(glider: str, content: Aborted) -> Text:
+    """The glider reported in a call that something is wrong."""
+    main, name = content.reports[0], clean(glider, 40)
     page = Page(
-        tuple(f"{name}: {_sentence(one)}." for one in told),
-        (("Since", utc(main.t)), *_facts(call)),
-        (("Check", _checks(told)),),
+        tuple(f"{name}: {_sentence(one)}." for one in content.reports),
+        (("Since", utc(main.t)), *_facts(content.call)),
+        (("Check", _checks(content.reports)),),
     )
-    severity = max(one.severity for one in told)
-    return _alert(glider, call.last_t, Kind.ABORT, title, page, alert_id, thread, severity, severity)
+    return f"{name} {_title(main)}", page
 
 
-def resumed(glider: str, call: Call, *, alert_id: str, thread: str, audience: Severity) -> Alert:
-    """The glider flies a mission of its pilots again, as it told in a `call`."""
-    name, mission = clean(glider, 40), clean(call.mission, 40)
-    page = Page((f"{name} is in its mission again: {mission}.",), _facts(call))
-    title = f"ALL CLEAR {name}: in its mission again ({mission})"
-    return _alert(glider, call.last_t, Kind.ALL_CLEAR, title, page, alert_id, thread, Severity.INFO, audience)
+def still_aborted(glider: str, content: StillAborted) -> Text:
+    """The glider still flies no mission of its pilots."""
+    main, name = content.reports[0], clean(glider, 40)
+    since = duration(3600 * content.hours)
+    page = Page(
+        (f"{name}: for {since} now it flies no mission of yours.", f"It reported: {_sentence(main)}."),
+        (("Since", utc(main.t)), *_facts(content.call)),
+        (("Check", _checks(content.reports)),),
+    )
+    return f"REMINDER {name} {_title(main)}", page
 
 
-def without_file(
-    glider: str, calls: tuple[Call, ...], *, alert_id: str, thread: str, severity: Severity
-) -> Alert:
-    """The glider called, so often in a row as there are `calls`, and sent no file."""
+def resumed(glider: str, content: Resumed) -> Text:
+    """The glider flies a mission of its pilots again."""
+    name, mission = clean(glider, 40), clean(content.call.mission, 40)
+    page = Page((f"{name} is in its mission again: {mission}.",), _facts(content.call))
+    return f"ALL CLEAR {name}: in its mission again ({mission})", page
+
+
+def without_file(glider: str, content: CalledWithoutFile) -> Text:
+    """The glider called and sent no file, once or several times in a row."""
+    calls = content.calls
     name, last, n = clean(glider, 40), calls[-1], len(calls)
     if n == 1:
         title, lead = f"{name} CALLED and sent no file", f"{name} called and sent no file. It lives."
@@ -99,52 +100,38 @@ def without_file(
         title = f"{name} CALLS WITHOUT A FILE: {n} in a row"
         lead = f"{name} called {n} times in a row and sent no file. It lives, but is not watched."
     cut = tuple(f"the transfer of {clean(file, 40)} was cut" for file in _cut(calls))
-    page = Page(
-        (lead,),
-        (
-            ("Since", utc(calls[0].began)),
-            ("Last call", f"{utc(last.began)} to {utc(last.last_t)}"),
-            *_facts(last),
-        ),
-        (
-            *((("Cut", cut),) if cut else ()),
-            (
-                "Check",
-                ("does the login script send files?", "the quality of the connection; the other number"),
-            ),
-        ),
-    )
-    return _alert(glider, last.last_t, Kind.CALL, title, page, alert_id, thread, severity, severity)
+    facts = (("Since", utc(calls[0].began)), ("Last call", f"{utc(last.began)} to {utc(last.last_t)}"))
+    check = ("does the login script send files?", "the quality of the connection; the other number")
+    lists = (*((("Cut", cut),) if cut else ()), ("Check", check))
+    return title, Page((lead,), (*facts, *_facts(last)), lists)
 
 
-def sends_again(glider: str, call: Call, *, alert_id: str, thread: str) -> Alert:
-    """The glider sent a file in a `call`, after several without."""
+def sends_again(glider: str, content: SendsAgain) -> Text:
+    """The glider sent a file, after several calls without."""
     name = clean(glider, 40)
-    page = Page((f"{name} sends files again.",), _facts(call))
-    title = f"ALL CLEAR {name}: it sends files again"
-    return _alert(
-        glider, call.last_t, Kind.ALL_CLEAR, title, page, alert_id, thread, Severity.INFO, Severity.WARNING
+    return f"ALL CLEAR {name}: it sends files again", Page(
+        (f"{name} sends files again.",), _facts(content.call)
     )
 
 
-def _title(told: Told) -> str:
-    if told.is_history:
-        return f"had ABORTED before: {_cause(told.cause)}, {utc(told.t)}"
-    return _WORDS[told.what][0].format(cause=_cause(told.cause))
+def _title(report: AbortReport) -> str:
+    if report.is_history:
+        return f"had ABORTED before: {_cause(report.cause)}, {utc(report.t)}"
+    return _WORDS[report.what][0].format(cause=_cause(report.cause))
 
 
-def _sentence(told: Told) -> str:
-    if told.is_history:
-        return f"the first log known shows an abort of {utc(told.t)} ({_cause(told.cause)})"
-    return _WORDS[told.what][1].format(cause=_cause(told.cause), at=utc(told.t))
+def _sentence(report: AbortReport) -> str:
+    if report.is_history:
+        return f"the first log known shows an abort of {utc(report.t)} ({_cause(report.cause)})"
+    return _WORDS[report.what][1].format(cause=_cause(report.cause), at=utc(report.t))
 
 
 def _cause(cause: str) -> str:
     return CAUSES.get(cause, clean(cause, 40) or "cause not told")
 
 
-def _checks(told: Iterable[Told]) -> tuple[str, ...]:
-    causes = {one.cause for one in told}
+def _checks(reports: Iterable[AbortReport]) -> tuple[str, ...]:
+    causes = {one.cause for one in reports}
     leak = ("leak detectors and vacuum: plot the last values before you believe them",)
     return (
         *(leak if causes & {"LEAK", "VACUUM"} else ()),
@@ -173,29 +160,3 @@ def _facts(call: Call) -> tuple[tuple[str, str], ...]:
 
 def _cut(calls: Iterable[Call]) -> tuple[str, ...]:
     return tuple(file for call in calls for file in call.announced if file not in call.sent)[:5]
-
-
-def _alert(
-    glider: str,
-    time: float,
-    kind: Kind,
-    title: str,
-    page: Page,
-    alert_id: str,
-    thread: str,
-    severity: Severity,
-    audience: Severity,
-) -> Alert:
-    title = clean(title)
-    return Alert(
-        id=alert_id,
-        glider=glider,
-        time=time,
-        kind=kind,
-        severity=severity,
-        audience=audience,
-        incident=thread,
-        title=title,
-        body=page.text(),
-        html=page.html(title),
-    )

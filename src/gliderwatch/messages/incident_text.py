@@ -2,11 +2,15 @@
 
 Written for a pilot with a phone at 3 am: the first line says what and how bad, then since when,
 where, the numbers, what speaks for and against, what to check. Names and notes come from files, so
-each is made one printable line (`words.clean`). The caller gives each alert its id and audience.
+each is made one printable line (`formatting.clean`).
 """
 
 from __future__ import annotations
 
+from math import degrees
+
+from gliderwatch.fleet.advice import Advice
+from gliderwatch.incidents.notices import Cleared, Corrected, NewRegime, Opened, StillOpen, Surfaced
 from gliderwatch.messages.evidence import checks, difference, how_sure, out_of_range, weigh
 from gliderwatch.messages.formatting import (
     INCIDENTS,
@@ -20,39 +24,29 @@ from gliderwatch.messages.formatting import (
     speed,
     utc,
 )
-from gliderwatch.messages.template import Page
-from gliderwatch.model import Alert, Assessment, Flag, Incident, Kind, NextSurfacing, Severity
+from gliderwatch.messages.template import Page, Text
+from gliderwatch.model import Assessment, Flag, Incident, Kind
 
 TITLES = {Kind.ANOMALY: "ANOMALY", Kind.FALSE_ALARM: "MEASUREMENTS DISAGREE"}
 
 
-def opened(incident: Incident, assessment: Assessment, *, alert_id: str, audience: Severity) -> Alert:
-    """The first message of an incident; `assessment` is the dive whose surfacing opened it."""
+def opened(glider: str, content: Opened) -> Text:
+    """The first message of an incident."""
+    incident, dive = content.incident, content.dive
     page = Page(
-        (_headline(incident.kind, assessment),),
-        (_since(incident), *_facts(assessment, incident.dives)),
-        (*_weighed(incident.kind, assessment), ("Check", checks(incident, assessment))),
+        (_headline(incident.kind, dive),),
+        (_since(incident), *_facts(dive, incident.dives)),
+        (*_weighed(incident.kind, dive), ("Check", checks(incident, dive))),
     )
     doubt = "do not trust its speed, " if incident.kind is Kind.FALSE_ALARM else ""
-    title = f"{TITLES[incident.kind]} {_glider(incident)}: {doubt}{_against_range(assessment)}"
-    return _alert(
-        incident,
-        assessment.t_surface,
-        incident.kind,
-        title,
-        page,
-        severity=incident.severity,
-        alert_id=alert_id,
-        audience=audience,
-    )
+    return f"{TITLES[incident.kind]} {clean(glider, 40)}: {doubt}{_against_range(dive)}", page
 
 
-def reminder(
-    incident: Incident, latest: Assessment, hours: float, *, alert_id: str, audience: Severity
-) -> Alert:
-    """The incident is still open `hours` after it began; `latest` is the glider's last assessed dive."""
-    age = duration(hours * 3600)
-    lead = f"{_glider(incident)}: the {_name(incident)} is still open after {age}. "
+def still_open(glider: str, content: StillOpen) -> Text:
+    """The reminder of an incident."""
+    incident, latest = content.incident, content.dive
+    age = duration(content.hours * 3600)
+    lead = f"{clean(glider, 40)}: the {_name(incident)} is still open after {age}. "
     lead += f"Latest dive: {flag_words(latest)}."
     flagged = latest.flag == (Flag.FALSE_ALARM if incident.kind is Kind.FALSE_ALARM else Flag.ANOMALY)
     page = Page(
@@ -60,154 +54,97 @@ def reminder(
         (_since(incident), ("Worst", _worst(incident)), *_facts(latest, incident.dives)),
         (*_weighed(incident.kind, latest), ("Check", checks(incident, latest))),
     )
-    title = f"REMINDER {_glider(incident)}: {_name(incident)} for {age}, {_against_range(latest)}"
-    return _alert(
-        incident,
-        latest.t_surface,
-        Kind.REMINDER,
-        title,
-        page,
-        severity=incident.severity,
-        alert_id=alert_id,
-        audience=audience,
-    )
+    return f"REMINDER {clean(glider, 40)}: {_name(incident)} for {age}, {_against_range(latest)}", page
 
 
-def all_clear(
-    incident: Incident,
-    assessment: Assessment,
-    *,
-    alert_id: str,
-    audience: Severity,
-    others: tuple[Incident, ...] = (),
-) -> Alert:
-    """The incident is over; `assessment` is the dive that cleared it, `others` are incidents that go on."""
-    end = assessment.t_surface if incident.cleared_at is None else incident.cleared_at
+def cleared(glider: str, content: Cleared) -> Text:
+    """The all-clear of an incident, which says what goes on."""
+    incident, dive, others = content.incident, content.dive, content.others
+    end = dive.t_surface if incident.cleared_at is None else incident.cleared_at
     still = " and ".join(f"the {_name(other)} since {utc(other.since)}" for other in others)
     if still:
-        lead = f"{_glider(incident)}: the {_name(incident)} is over, but not all is well: "
-        lead += f"{still} is still open. Latest dive: {flag_words(assessment)}."
-        title = f"ALL CLEAR {_glider(incident)}: {_name(incident)} over, {_name(others[0])} still open"
+        lead = f"{clean(glider, 40)}: the {_name(incident)} is over, but not all is well: "
+        lead += f"{still} is still open. Latest dive: {flag_words(dive)}."
+        title = f"ALL CLEAR {clean(glider, 40)}: {_name(incident)} over, {_name(others[0])} still open"
     elif incident.kind is Kind.FALSE_ALARM:
-        lead = f"{_glider(incident)}: the measurements agree again, {_against_range(assessment)}. "
+        lead = f"{clean(glider, 40)}: the measurements agree again, {_against_range(dive)}. "
         lead += f"The {_name(incident)} is over."
-        title = f"ALL CLEAR {_glider(incident)}: measurements agree, {_against_range(assessment)}"
+        title = f"ALL CLEAR {clean(glider, 40)}: measurements agree, {_against_range(dive)}"
     else:
-        lead = f"{_glider(incident)} is normal again: {_against_range(assessment)}. "
+        lead = f"{clean(glider, 40)} is normal again: {_against_range(dive)}. "
         lead += f"The {_name(incident)} is over."
-        title = f"ALL CLEAR {_glider(incident)}: {_against_range(assessment)}"
-    page = Page(
-        (lead,),
-        (
-            _since(incident),
-            ("Lasted", f"{duration(end - incident.since)}, cleared {utc(end)}"),
-            ("Worst", _worst(incident)),
-            *_facts(assessment, 0),
-        ),
+        title = f"ALL CLEAR {clean(glider, 40)}: {_against_range(dive)}"
+    facts = (
+        _since(incident),
+        ("Lasted", f"{duration(end - incident.since)}, cleared {utc(end)}"),
+        ("Worst", _worst(incident)),
+        *_facts(dive, 0),
     )
-    return _alert(
-        incident,
-        assessment.t_surface,
-        Kind.ALL_CLEAR,
-        title,
-        page,
-        severity=Severity.INFO,
-        alert_id=alert_id,
-        audience=audience,
-    )
+    return title, Page((lead,), facts)
 
 
-def correction(
-    before: Incident,
-    now: Incident | None,
-    assessment: Assessment,
-    why: str,
-    *,
-    alert_id: str,
-    audience: Severity,
-) -> Alert:
-    """Data that came later changed what was said: `before` as told, `now` as known (None: withdrawn).
-
-    `assessment` is the dive concerned as it is assessed now, `why` says what data did it.
-    """
-    lead = f"Correction for {_glider(before)}: {clean(why)}. "
+def corrected(glider: str, content: Corrected) -> Text:
+    """Data that came later changed what was reported."""
+    before, now, dive = content.before, content.now, content.dive
+    lead = f"Correction for {clean(glider, 40)}: {clean(content.why)}. "
     lead += f"The {_name(before)} {'is withdrawn' if now is None else 'stands'}. "
-    lead += f"The dive as assessed now: {flag_words(assessment)}."
+    lead += f"The dive as assessed now: {flag_words(dive)}."
     page = Page(
         (lead,),
         (
-            ("Told before", _told(before)),
-            ("Known now", "no incident" if now is None else _told(now)),
-            *_facts(assessment, 0 if now is None else now.dives),
+            ("Told before", _summary(before)),
+            ("Known now", "no incident" if now is None else _summary(now)),
+            *_facts(dive, 0 if now is None else now.dives),
         ),
-        () if now is None else _weighed(before.kind, assessment),
+        () if now is None else _weighed(before.kind, dive),
     )
     verdict = "withdrawn" if now is None else "stands"
-    title = f"CORRECTION {_glider(before)}: {_name(before)} {verdict}, {_against_range(assessment)}"
-    severity = Severity.INFO if now is None else now.severity
-    return _alert(
-        before,
-        assessment.t_surface,
-        Kind.CORRECTION,
-        title,
-        page,
-        severity=severity,
-        alert_id=alert_id,
-        audience=audience,
-    )
+    return f"CORRECTION {clean(glider, 40)}: {_name(before)} {verdict}, {_against_range(dive)}", page
 
 
-def surfacing(
-    assessment: Assessment,
-    previous: float | None,
-    *,
-    alert_id: str,
-    expected: NextSurfacing | None = None,
-    audience: Severity = Severity.INFO,
-) -> Alert:
-    """The notice of one surfacing; `previous` is the time of the one before (s), `expected` the next."""
-    a = assessment
+def surfaced(glider: str, content: Surfaced) -> Text:
+    """The notice of one surfacing."""
+    a, previous, expected = content.dive, content.previous, content.expected
     after: tuple[tuple[str, str], ...] = ()
     if previous is not None:
         after = (("After the one before", duration(a.t_surface - previous)),)
     if expected is not None:
         when = f"{utc(expected.t)}, within {duration(1.96 * expected.t_sigma)} (95 %)"
         after += (("Next surfacing", f"{when}, {place(expected.lat, expected.lon)}"),)
+    after += tuple((f"Look next for {clean(name, 64)}", _advice(each)) for name, each in content.advice)
     page = Page(
-        (f"{_glider(a)} surfaced {utc(a.t_surface)}: {flag_words(a)}.",),
+        (f"{clean(glider, 40)} surfaced {utc(a.t_surface)}: {flag_words(a)}.",),
         (*after, *_facts(a, 0)),
         (("Data", tuple(clean(note) for note in a.notes)),) if a.notes else (),
     )
-    title = f"SURFACED {_glider(a)} {utc(a.t_surface)}: {_speed(a)}, {flag_words(a, short=True)}"
-    return _alert(
-        a,
-        a.t_surface,
-        Kind.SURFACING,
-        title,
-        page,
-        severity=Severity.INFO,
-        alert_id=alert_id,
-        audience=audience,
-    )
+    return f"SURFACED {clean(glider, 40)} {utc(a.t_surface)}: {_speed(a)}, {flag_words(a, short=True)}", page
 
 
-def operator(
-    title: str,
-    text: str,
-    time: float,
-    *,
-    alert_id: str,
-    severity: Severity,
-    audience: Severity,
-    glider: str = "",
-) -> Alert:
-    """A message about the watch itself, not about a flight: a folder gone, files that cannot be read."""
-    lines = tuple(line for line in (clean(raw, 500) for raw in text.splitlines()) if line)
-    subject = f"GLIDERWATCH {clean(glider, 40)}: {title}" if glider else f"GLIDERWATCH: {title}"
-    page = Page(lines, (("Time", utc(time)),))
-    return _alert(
-        glider, time, Kind.OPERATOR, subject, page, severity=severity, alert_id=alert_id, audience=audience
+def new_regime(glider: str, content: NewRegime) -> Text:
+    """The glider is flown in a new way."""
+    a, before, name = content.dive, content.before, clean(glider, 40)
+    assert a.speed is not None
+    what = "faster" if a.speed > before else "slower"
+    normal = f"{a.speed_min:.2f} to {a.speed_max:.2f} m/s"
+    why = "A thruster, ballast or pitch does that" if what == "faster" else "Pitch or ballast changed as well"
+    since = utc(content.since)
+    lead = f"{name} flies {what} since {since}: {a.speed:.2f} m/s, {before:.2f} m/s before."
+    check = (
+        f"{why}; if it was not you, see what is wrong.",
+        "To say otherwise, set normal_speed for this glider in the configuration.",
     )
+    page = Page(
+        (lead, f"New normal range: {normal}, unless you say otherwise."),
+        (("Since", since), *_facts(a, 0)),
+        (("Check", check),),
+    )
+    return f"NEW NORMAL {name}: flies {what}, {a.speed:.2f} m/s (now normal: {normal})", page
+
+
+def _advice(advice: Advice) -> str:
+    """Heading and waypoint of an advice, and what it is good for."""
+    steer = f"steer {degrees(advice.heading):03.0f} deg true to {place(advice.lat, advice.lon)}"
+    return f"{steer}: takes {100 * advice.variance:.1f} % off the uncertainty"
 
 
 def flag_words(assessment: Assessment, *, short: bool = False) -> str:
@@ -225,38 +162,8 @@ def flag_words(assessment: Assessment, *, short: bool = False) -> str:
     return f"{words[0]}: {clean(assessment.reason, 100) or words[1]}"
 
 
-def _alert(
-    about: Incident | Assessment | str,
-    time: float,
-    kind: Kind,
-    title: str,
-    page: Page,
-    *,
-    severity: Severity,
-    alert_id: str,
-    audience: Severity,
-) -> Alert:
-    title = clean(title)
-    return Alert(
-        id=alert_id,
-        glider=about if isinstance(about, str) else about.glider,
-        time=time,
-        kind=kind,
-        severity=severity,
-        audience=audience,
-        incident=about.id if isinstance(about, Incident) else "",
-        title=title,
-        body=page.text(),
-        html=page.html(title),
-    )
-
-
 def _name(incident: Incident) -> str:
     return INCIDENTS[incident.kind]
-
-
-def _glider(about: Incident | Assessment) -> str:
-    return clean(about.glider, 40)
 
 
 def _normal(a: Assessment) -> str:
@@ -285,8 +192,8 @@ def _headline(kind: Kind, a: Assessment) -> str:
         if apart is not None and p_e is not None and p_e > a.gamma_f:
             size = f" by {speed(apart)} (p_E {p_e:.3f}, limit {a.gamma_f:.3f})"
         why = clean(a.reason, 100) or "flow and reference disagree"
-        return f"{_glider(a)}: {why}{size}. Its speed of {_speed(a)} cannot be trusted."
-    sentence = f"{_glider(a)} flies at {_speed(a)} through the water"
+        return f"{clean(a.glider, 40)}: {why}{size}. Its speed of {_speed(a)} cannot be trusted."
+    sentence = f"{clean(a.glider, 40)} flies at {_speed(a)} through the water"
     if value is None or not out_of_range(a, value):
         why = clean(a.reason, 100) if a.flag == Flag.ANOMALY else ""
         return f"{sentence}, {_normal(a)} m/s" + (f": {why}." if why else ".")
@@ -307,7 +214,7 @@ def _worst(incident: Incident) -> str:
     return f"{_speed(incident.worst)}, dive of {utc(incident.worst.t_dive)}"
 
 
-def _told(incident: Incident) -> str:
+def _summary(incident: Incident) -> str:
     state = "open" if incident.cleared_at is None else f"cleared {utc(incident.cleared_at)}"
     since = f"{_name(incident)} since {utc(incident.since)}"
     return f"{since}, {_dives(incident)}, worst {_speed(incident.worst)}, {state}"

@@ -8,7 +8,27 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from gliderwatch.messages import call_text, incident_text, overdue_text, unjudged_text
+from gliderwatch.incidents.notices import (
+    Aborted,
+    AbortReport,
+    Absence,
+    Blind,
+    Blindness,
+    CalledWithoutFile,
+    Cleared,
+    Content,
+    Corrected,
+    DriftEllipse,
+    Fleet,
+    NewRegime,
+    Notice,
+    Opened,
+    Overdue,
+    StillOpen,
+    Surfaced,
+    Unjudged,
+)
+from gliderwatch.messages.notice_text import operator, render
 from gliderwatch.messages.template import with_lead
 from gliderwatch.model import (
     Alert,
@@ -94,10 +114,14 @@ def _incident(kind: Kind, worst: Assessment, severity: Severity) -> Incident:
     return Incident("", GLIDER, kind, severity, since, worst.t_surface, None, 2, worst, worst)
 
 
+def _message(kind: Kind, severity: Severity, time: float, content: Content) -> Alert:
+    return render(Notice("", "", GLIDER, time, kind, severity, severity, content))
+
+
 def _opened(kind: Kind, dive: Assessment, severity: Severity) -> Callable[[float], Alert]:
     def make(now: float) -> Alert:
         worst = _at(dive, now)
-        return incident_text.opened(_incident(kind, worst, severity), worst, alert_id="", audience=severity)
+        return _message(kind, severity, now, Opened(_incident(kind, worst, severity), worst))
 
     return make
 
@@ -105,52 +129,53 @@ def _opened(kind: Kind, dive: Assessment, severity: Severity) -> Callable[[float
 def _all_clear(now: float) -> Alert:
     worst = _at(_SLOW, now - 8 * _HOUR)
     over = replace(_incident(Kind.ANOMALY, worst, Severity.CRITICAL), cleared_at=now)
-    return incident_text.all_clear(over, _at(_HEALTHY, now), alert_id="", audience=Severity.CRITICAL)
+    return _message(Kind.ALL_CLEAR, Severity.INFO, now, Cleared(over, _at(_HEALTHY, now)))
 
 
 def _reminder(now: float) -> Alert:
     incident = _incident(Kind.ANOMALY, _at(_SLOW, now - 24 * _HOUR), Severity.CRITICAL)
-    return incident_text.reminder(incident, _at(_SLOW, now), 24.0, alert_id="", audience=Severity.CRITICAL)
+    content = StillOpen(incident, _at(_SLOW, now), 24.0)
+    return _message(Kind.REMINDER, Severity.CRITICAL, now, content)
 
 
 def _correction(now: float) -> Alert:
     dive = _at(_SLOW, now - 4 * _HOUR)
-    return incident_text.correction(
+    content = Corrected(
         _incident(Kind.ANOMALY, dive, Severity.CRITICAL),
         None,
         replace(dive, flag=Flag.NORMAL, speed=0.24),
         "the depth-averaged current of the dive was corrected",
-        alert_id="",
-        audience=Severity.CRITICAL,
     )
+    return _message(Kind.CORRECTION, Severity.INFO, dive.t_surface, content)
 
 
 def _overdue(now: float) -> Alert:
     last = _at(_HEALTHY, now - 9 * _HOUR)
     expected = last.t_surface + 4 * _HOUR
-    absence = overdue_text.Absence(
+    absence = Absence(
         glider=GLIDER,
         now=now,
         heard=last.t_surface,
         awaited=expected,
         lat=24.21,
         lon=-83.01,
-        area=overdue_text.DriftEllipse(24.24, -82.99, 9200.0, 6100.0, 48.0),
+        area=DriftEllipse(24.24, -82.99, 9200.0, 6100.0, 48.0),
         last=last,
+        flow=(0.15, 0.17),
         incidents=(),
-        fleet=overdue_text.Fleet(2, 0, now - _HOUR),
+        fleet=Fleet(2, 0, now - _HOUR),
     )
-    return overdue_text.overdue(absence, alert_id="", thread="", severity=Severity.WARNING, first=True)
+    return _message(Kind.OVERDUE, Severity.WARNING, now, Overdue(absence, first=True))
 
 
 def _unknown(now: float) -> Alert:
     words = "cache file 0a1b2c3d.cac is missing: not in /var/opt/gmc/cache"
     waits = [
-        unjudged_text.Unjudged(now - start * _HOUR, now - end * _HOUR, Hindrance.NO_CACHE, words, "0a1b2c3d")
+        Unjudged(now - start * _HOUR, now - end * _HOUR, Hindrance.NO_CACHE, words, "0a1b2c3d")
         for start, end in ((23, 20), (19, 16), (15, 12), (11, 8), (7, 4), (3, 0))
     ]
-    found = unjudged_text.Blindness(GLIDER, now - 24 * _HOUR, now, now - 24 * _HOUR, tuple(waits))
-    return unjudged_text.blind(found, alert_id="", thread="", first=True)
+    found = Blindness(GLIDER, now - 24 * _HOUR, now, now - 24 * _HOUR, tuple(waits))
+    return _message(Kind.UNKNOWN, Severity.WARNING, now, Blind(found, first=True))
 
 
 def _call(now: float) -> Call:
@@ -167,23 +192,28 @@ def _call(now: float) -> Call:
 
 
 def _abort(now: float) -> Alert:
-    found = call_text.Told(Happening.ABORTING, now, "LEAK", Severity.CRITICAL)
-    return call_text.aborted(GLIDER, (found,), _call(now), alert_id="", thread="")
+    report = AbortReport(Happening.ABORTING, now, "LEAK", Severity.CRITICAL)
+    return _message(Kind.ABORT, Severity.CRITICAL, now, Aborted((report,), _call(now)))
 
 
 def _without_file(now: float) -> Alert:
     calls = (_call(now - 3 * _HOUR), _call(now))
-    return call_text.without_file(GLIDER, calls, alert_id="", thread="", severity=Severity.WARNING)
+    return _message(Kind.CALL, Severity.WARNING, now, CalledWithoutFile(calls))
 
 
 def _surfacing(now: float) -> Alert:
     expected = NextSurfacing(now, now + 4 * _HOUR, 1500.0, 24.21, -83.01, 1e6, 0.0, 1e6, "its last dives")
     dive = _at(_HEALTHY, now)
-    return incident_text.surfacing(dive, now - 4 * _HOUR, alert_id="", expected=expected)
+    return _message(Kind.SURFACING, Severity.INFO, now, Surfaced(dive, now - 4 * _HOUR, expected))
+
+
+def _regime(now: float) -> Alert:
+    dive = replace(_at(_HEALTHY, now), speed=0.49, speed_min=0.42, speed_max=0.66)
+    return _message(Kind.REGIME, Severity.INFO, now, NewRegime(dive, 0.29, now - 10 * _HOUR))
 
 
 def _operator(now: float) -> Alert:
-    return incident_text.operator(
+    return operator(
         "no file of any glider for 26.0 h",
         "Check the dockserver, its modems and telephone lines, and the share that its folders are on.",
         now,
@@ -203,6 +233,7 @@ SAMPLES: dict[Kind, Callable[[float], Alert]] = {
     Kind.ALL_CLEAR: _all_clear,
     Kind.REMINDER: _reminder,
     Kind.CORRECTION: _correction,
+    Kind.REGIME: _regime,
     Kind.SURFACING: _surfacing,
     Kind.OPERATOR: _operator,
 }

@@ -52,7 +52,7 @@ _HTML = Environment(
 class Page:
     """A message before it has a form: paragraphs, labelled facts, lists under headings.
 
-    The fact labelled ``Map`` is a link, made by `words.map_link` and of numbers only.
+    The fact labelled ``Map`` is a link, made by `formatting.map_link` and of numbers only.
     """
 
     lead: tuple[str, ...]
@@ -71,6 +71,10 @@ class Page:
         return _HTML.render(title=title, page=self)
 
 
+Text = tuple[str, Page]
+"""A message's title and what it says."""
+
+
 def with_lead(html: str, line: str) -> str:
     """HTML of a page with one more line above its title, the first paragraph."""
     return html.replace("<p ", f"<p><b>{escape(line)}</b></p>\n<p ", 1)
@@ -82,7 +86,7 @@ def with_lead(html: str, line: str) -> str:
 
 def escalated(alert: Alert, waited: float) -> Alert:
     """The message, for who is told it after so long (s) without an acknowledgement."""
-    muted = tuple(f"{alert.glider}/{kind}/" for kind in (Kind.OVERDUE, Kind.UNKNOWN, Kind.ABORT, Kind.CALL))
+    muted = tuple(f"{alert.glider}/{kind}/" for kind in (Kind.OVERDUE, Kind.UNKNOWN))
     is_muted = alert.incident.startswith(muted)  # there is no incident to acknowledge
     command = f"mute {alert.glider} --hours 6" if is_muted else f"ack {alert.incident.rstrip('+')}"
     lead = f"Nobody has acknowledged this for {duration(waited)}: that is why you are told. "

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass
 
+from gliderwatch.incidents.notices import Blind, JudgedAgain, Unjudged
 from gliderwatch.messages.formatting import clean, duration, utc
-from gliderwatch.messages.template import Page
-from gliderwatch.model import Alert, Hindrance, Kind, Severity, Unusable
+from gliderwatch.messages.template import Page, Text
+from gliderwatch.model import Hindrance, Unusable
 
 _SHOWN = 4
 """Reasons that a message names, the most frequent first."""
@@ -34,47 +34,12 @@ CURES: dict[Unusable | Hindrance | None, str] = {
 """What a pilot can do about each reason."""
 
 
-@dataclass(frozen=True, slots=True)
-class Unjudged:
-    """What should have led to a judgement and did not: a dive without a flag, or a file that was not taken.
-
-    ``start`` and ``end`` (s); ``cause`` for decisions (None: the estimator's own, as in ``words``) and in
-    ``words``; ``crc`` of the cache file that is missing.
-    """
-
-    start: float
-    end: float
-    cause: Unusable | Hindrance | None
-    words: str
-    crc: str = ""
-
-    @property
-    def is_file(self) -> bool:
-        """Whether it is a file that was not taken."""
-        return isinstance(self.cause, Hindrance)
-
-
-@dataclass(frozen=True, slots=True)
-class Blindness:
-    """Nothing of a glider could be judged from ``since`` to ``until`` (s).
-
-    ``judged`` is the last surfacing (s) whose dive could be (None: none), ``items`` what could not, in order.
-    """
-
-    glider: str
-    since: float
-    until: float
-    judged: float | None
-    items: tuple[Unjudged, ...]
-
-
-def blind(found: Blindness, *, alert_id: str, thread: str, first: bool) -> Alert:
-    """No dive can be judged; not the ``first`` message of it: it still is so."""
-    reasons = _reasons(found.items)
+def blind(glider: str, content: Blind) -> Text:
+    """No dive can be judged, or still none can."""
+    found, reasons = content.found, _reasons(content.found.items)
     (main, count), lasted = reasons[0], duration(found.until - found.since)
-    lead = f"{'No' if first else 'Still no'} dive of {_name(found.glider)} could be judged for {lasted}, "
-    lead += "although it is at sea and its files come. "
-    lead += "A fault of the glider would not be seen."
+    lead = f"{'No' if content.first else 'Still no'} dive of {_name(glider)} could be judged for "
+    lead += f"{lasted}, although it is at sea and its files come. A fault of the glider would not be seen."
     last = "none yet" if found.judged is None else f"surfaced {utc(found.judged)}"
     page = Page(
         (lead,),
@@ -88,43 +53,17 @@ def blind(found: Blindness, *, alert_id: str, thread: str, first: bool) -> Alert
             *((("Other reasons", tuple(_reason(*reason) for reason in reasons[1:])),) if reasons[1:] else ()),
         ),
     )
-    title = f"{'' if first else 'REMINDER '}CANNOT BE JUDGED {_name(found.glider)}: {lasted} without a "
-    title += f"judgement, {clean(main.words, 80)}"
-    kind = Kind.UNKNOWN if first else Kind.REMINDER
-    return _alert(found.glider, found.until, kind, title, page, alert_id, thread, Severity.WARNING)
+    title = f"{'' if content.first else 'REMINDER '}CANNOT BE JUDGED {_name(glider)}: {lasted} without "
+    title += f"a judgement, {clean(main.words, 80)}"
+    return title, page
 
 
-def judged(glider: str, since: float, at: float, *, alert_id: str, thread: str) -> Alert:
-    """A dive that surfaced ``at`` a time (s) could be judged, the first after ``since`` (s)."""
-    lead = f"Dives of {_name(glider)} can be judged again, after {duration(at - since)} without a judgement."
-    page = Page((lead,), (("Without a judgement", f"{utc(since)} to {utc(at)}"),))
-    title = f"ALL CLEAR {_name(glider)}: its dives can be judged again"
-    return _alert(glider, at, Kind.ALL_CLEAR, title, page, alert_id, thread, Severity.INFO)
-
-
-def _alert(
-    glider: str,
-    time: float,
-    kind: Kind,
-    title: str,
-    page: Page,
-    alert_id: str,
-    thread: str,
-    severity: Severity,
-) -> Alert:
-    title = clean(title)
-    return Alert(
-        id=alert_id,
-        glider=glider,
-        time=time,
-        kind=kind,
-        severity=severity,
-        audience=Severity.WARNING,
-        incident=thread,
-        title=title,
-        body=page.text(),
-        html=page.html(title),
-    )
+def judged_again(glider: str, content: JudgedAgain) -> Text:
+    """A dive could be judged again."""
+    lasted = duration(content.at - content.since)
+    lead = f"Dives of {_name(glider)} can be judged again, after {lasted} without a judgement."
+    page = Page((lead,), (("Without a judgement", f"{utc(content.since)} to {utc(content.at)}"),))
+    return f"ALL CLEAR {_name(glider)}: its dives can be judged again", page
 
 
 def _reasons(items: tuple[Unjudged, ...]) -> list[tuple[Unjudged, int]]:

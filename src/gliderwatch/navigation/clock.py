@@ -111,6 +111,35 @@ def corrections(stamps: Sequence[Stamp], start: Correction = Correction()) -> li
     return [found[stamp.number] for stamp in stamps]
 
 
+@dataclass(frozen=True, slots=True)
+class MissionClock:
+    """How the clock of a mission stands at its segment of the highest number, so that the next segment needs
+    no look at all of them: its stamp, its correction's offset (s), and the ``second_longest`` duration of a
+    segment (s), which says where a wild end begins."""
+
+    newest: Stamp
+    offset: float
+    second_longest: float
+
+    def next(self, stamp: Stamp) -> Correction | None:
+        """The correction of one more segment, as `corrections` of all would give it, which leaves those of
+        the others as they are; None where only a look at all can tell."""
+        if stamp.number <= self.newest.number or stamp.last_t - stamp.opened_at > self.second_longest:
+            return None
+        return _after(self.newest, self.offset, stamp)
+
+
+def mission_clock(stamps: Sequence[Stamp], found: Sequence[Correction]) -> MissionClock | None:
+    """The clock of a mission from all its segments and their corrections; None where these are too few, or
+    where a number is there twice."""
+    if len(stamps) < ENOUGH or len({stamp.number for stamp in stamps}) < len(stamps):
+        return None
+    newest = max(stamps, key=lambda stamp: stamp.number)
+    offset = found[stamps.index(newest)].offset
+    sound = next(s for s in _with_sound_ends(list(stamps)) if s.number == newest.number)
+    return MissionClock(sound, offset, sorted(s.last_t - s.opened_at for s in stamps)[-2])
+
+
 def _with_sound_ends(stamps: list[Stamp]) -> list[Stamp]:
     """The segments in order; one that is far longer than all others has a wild time stamp, no known end."""
     if len(stamps) < ENOUGH:

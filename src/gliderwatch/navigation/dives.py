@@ -202,12 +202,12 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
 
     before = state.dive
     fixes = new_fixes(samples, state.fix)
-    state, told = _withdraw_old_fix(state, fixes)
+    state, finished = _withdraw_old_fix(state, fixes)
     untold = [state.untold] if state.untold is not None else []
     for first, last in surface_intervals(fixes, SHORTEST_DIP):
         flight = _flight_since(state, samples, first)
         if flight is not None and flight.duration >= SHORTEST_DIVE:
-            told.append(_dive(state, segment.id.glider, samples, flight, first))
+            finished.append(_dive(state, segment.id.glider, samples, flight, first))
         elif flight is not None and flight.duration >= SHORTEST_DIP:
             untold.append(flight.end)
         holes = tuple((max(a, last.t), b) for a, b in state.holes if b > last.t)
@@ -217,13 +217,13 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
     oldest = (state.last_t or 0.0) - LONGEST_DIVE
     carry = after(samples, max(state.fix.t, oldest) if state.fix is not None else oldest)
     under_way = _flight_since(state, carry, None)
-    told, waiting = _with_currents(told, untold, under_way, [*state.reports, *reports])
+    finished, waiting = _with_currents(finished, untold, under_way, [*state.reports, *reports])
     waiting = [report for report in waiting if report.t > oldest]
-    latest, later = (told[-1] if told else None), max(untold, default=None)
+    latest, later = (finished[-1] if finished else None), max(untold, default=None)
     later = later if later is not None and (latest is None or later > latest.t_surface) else None
     name = state.last_name if under_way is None else ""
     state = replace(state, carry=carry, reports=tuple(waiting), dive=latest, untold=later, last_name=name)
-    news = [d for d in told if d is not before]
+    news = [d for d in finished if d is not before]
     if under_way is not None and under_way.duration >= SHORTEST_DIVE:
         news.append(_dive(state, segment.id.glider, carry, under_way, None))
     return state, news
@@ -380,7 +380,7 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
 
 
 def _with_currents(
-    told: list[Dive], untold: list[float], under_way: Flight | None, reports: list[Report]
+    finished: list[Dive], untold: list[float], under_way: Flight | None, reports: list[Report]
 ) -> tuple[list[Dive], list[Report]]:
     """The dives with the currents published for them, and the reports of a dive that is not told yet.
 
@@ -388,13 +388,13 @@ def _with_currents(
     published well within a flight is that of a part of it, up to a surfacing without a fix: so is then the
     one at its end, and neither is the current between the two fixes.
     """
-    flights = [(d.t_dive, d.t_surface, i) for i, d in enumerate(told)]
+    flights = [(d.t_dive, d.t_surface, i) for i, d in enumerate(finished)]
     if under_way is not None:
         flights.append((under_way.start, under_way.end, -1))
-    ends: list[tuple[float, int | None]] = [(d.t_surface, i) for i, d in enumerate(told)]
+    ends: list[tuple[float, int | None]] = [(d.t_surface, i) for i, d in enumerate(finished)]
     ends = sorted([*ends, *((t, None) for t in untold)], key=lambda end: end[0])
     surfaced = [t for t, _ in ends] + ([under_way.end] if under_way is not None else [])
-    out, waiting = list(told), []
+    out, waiting = list(finished), []
     for report, k in zip(reports, pair(reports, surfaced), strict=True):
         part = next((i for a, b, i in flights if a + SPARSE < report.t < b - CURRENT_EARLY), None)
         if part is not None:

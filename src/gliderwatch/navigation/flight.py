@@ -201,20 +201,20 @@ def find_flight(samples: Samples, after: float, before: float) -> Flight | None:
     )
     if _is_stuck(depth, pitch):
         depth = EMPTY
-    told = {"depth": depth.t[depth.v > DIVING_DEPTH]}
+    seen = {"depth": depth.t[depth.v > DIVING_DEPTH]}
     if len(pitch):
         steep = pitch.t[np.abs(pitch.v) > DIVING_PITCH]
-        told["pitch"] = _not_denied(steep, depth, after, before) if len(depth) else _mostly_steep(pitch)
+        seen["pitch"] = _not_denied(steep, depth, after, before) if len(depth) else _mostly_steep(pitch)
     elif (reckoning := _reckoning(samples, after, before)) is not None:
-        told["dead reckoning"] = _not_denied(reckoning, depth, after, before)
+        seen["dead reckoning"] = _not_denied(reckoning, depth, after, before)
     elif len(heading) and not len(depth):
         return Flight(after, before, "heading")
     else:
-        told["heading"] = _not_denied(heading.t, depth, after, before)
-    times = np.concatenate(list(told.values()))
+        seen["heading"] = _not_denied(heading.t, depth, after, before)
+    times = np.concatenate(list(seen.values()))
     if not len(times):
         return None
-    evidence = " and ".join(name for name, t in told.items() if len(t))
+    evidence = " and ".join(name for name, t in seen.items() if len(t))
     return Flight(float(times.min()), float(times.max()), evidence)
 
 
@@ -228,8 +228,8 @@ def lengthened(
     surface a glider tells its position at once. Where a whole file is missing (``holes``, s) that cannot be
     said.
     """
-    told = "depth" if len(get(samples, "depth").between(flight.start, before)) else "pitch"
-    times = np.concatenate([get(samples, told).t, get(samples, "fix_lat").t])
+    sensor = "depth" if len(get(samples, "depth").between(flight.start, before)) else "pitch"
+    times = np.concatenate([get(samples, sensor).t, get(samples, "fix_lat").t])
     end = float(np.min(times[times > flight.end], initial=before))
     if end - flight.end <= DENIES_DIVE or any(a < end and b > flight.end for a, b in holes):
         return flight
@@ -238,8 +238,8 @@ def lengthened(
 
 def unseen(samples: Samples, after: float, before: float) -> Flight | None:
     """All of the time between two positions where the files tell nothing of it: there may be a whole dive."""
-    told = ("depth", "pitch", "heading_e", "dr_state", "dr_time")
-    if any(len(get(samples, name).between(after, before)) for name in told):
+    names = ("depth", "pitch", "heading_e", "dr_state", "dr_time")
+    if any(len(get(samples, name).between(after, before)) for name in names):
         return None
     return Flight(after, before, "nothing")
 

@@ -73,8 +73,8 @@ def read_field(patterns: Sequence[str], area: Box | None = None, stale: float = 
     found = {path for pattern in patterns for path in _matching(pattern)}
     paths = sorted(found, key=lambda path: (path.name, path))
     if not paths:
-        told = ", ".join(repr(pattern) for pattern in patterns)
-        raise Retry(f"no file matches {told}: check the pattern, and that the folder is mounted")
+        names = ", ".join(repr(pattern) for pattern in patterns)
+        raise Retry(f"no file matches {names}: check the pattern, and that the folder is mounted")
     pieces = [_read(path, area) for path in paths]
     first, frames = pieces[0], dict[float, tuple[Array, Array]]()
     for piece in pieces:

@@ -7,7 +7,6 @@ import signal
 import sys
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -18,7 +17,7 @@ import structlog
 from gliderwatch.config import Config, load
 from gliderwatch.errors import ConfigError, DamagedError, GliderwatchError
 from gliderwatch.model import Alert
-from gliderwatch.service import intake, liveness, preconditions, state_outage, transaction
+from gliderwatch.service import liveness, preconditions, state_outage, transaction
 from gliderwatch.service.heartbeat import Upkeep
 from gliderwatch.service.intake import Intake
 from gliderwatch.service.liveness import BEAT, PidLock
@@ -50,7 +49,7 @@ class OverdueTimer:
     def tick(
         self,
         gliders: Sequence[str],
-        speaking: Routing,
+        routing: Routing,
         is_busy: Callable[[str], bool],
         now: float,
         monotonic: float,
@@ -67,15 +66,15 @@ class OverdueTimer:
         for glider in gliders:
             if is_busy(glider) or hold > 0:
                 continue
-            alerts += transaction.tick(self._store, glider, speaking, _others(gliders, glider, speaking), now)
-            at = transaction.next_tick(self._store, glider, speaking, now)
+            alerts += transaction.tick(self._store, glider, routing, _others(gliders, glider, routing), now)
+            at = transaction.next_tick(self._store, glider, routing, now)
             if at is not None and at > now:
                 pause = min(pause, at - now)
         return tuple(alerts), min(pause, hold) if hold > 0 else pause
 
 
-def _others(gliders: Iterable[str], glider: str, speaking: Routing) -> list[str]:
-    return [other for other in gliders if other != glider and not speaking.attention(other).recovered]
+def _others(gliders: Iterable[str], glider: str, routing: Routing) -> list[str]:
+    return [other for other in gliders if other != glider and not routing.attention(other).recovered]
 
 
 # ----------------------------------------
@@ -106,7 +105,7 @@ class Retention:
         return max(0.0, self._due - monotonic)
 
     def turn(self, keep_days: float | None, now: float, monotonic: float) -> None:
-        """Do one step, if one is due. Raises StateError; it is begun anew in an hour."""
+        """Do one step, if one is due. Raises StateError; it begins again in an hour."""
         if monotonic < self._due:
             return
         if self._work is None:
@@ -126,15 +125,11 @@ class Retention:
 
 
 # ----------------------------------------
-# The daemon: watches, decodes, takes in, and lives.
+# The daemon: watches, decodes, processes, and stays alive.
 #
 # One thread, this one, owns the estimation and the state file; the dispatcher owns the network; they meet
 # only in the outbox. The watcher and the decoder put their news into one queue.
 
-_AT_ONCE = 100
-"""Files looked at in one turn, so that signals and signs of life do not wait for a long list."""
-_LONGEST_TURN = 2.0
-"""Seconds after which it is enough of them: on a share that is slow to open each."""
 _SWITCH = 0.0005
 """Seconds after which a thread that has something to do interrupts the estimation (Python: 0.005). What the
 decoder sends comes through several hands: with the longer time its processes wait for this one."""
@@ -149,48 +144,47 @@ class Daemon:
         preconditions.require(
             config, config_path
         )  # before anything is made beside what may be another's file
-        self._life = PidLock(self._state)
+        self._lock = PidLock(self._state)
         self._store = state_outage.open_state(config)
-        self._trouble = StateOutage(self._store, self._is_stopping)
-        self._ticking = OverdueTimer(self._store)
+        self._outage = StateOutage(self._store, self._is_stopping)
+        self._overdue_timer = OverdueTimer(self._store)
         self._retention = Retention(self._store.remove, time.time(), time.monotonic())
         with state_outage.setting_aside(self._state), self._store.guarded():
             self._upkeep = Upkeep(config, self._store)
         self._news: SimpleQueue[News] = SimpleQueue()
         self._wake = threading.Event()
         self._stopping = False
-        self._reception = Intake(self._store, self._upkeep, self._wake, self._is_stopping)
+        self._intake = Intake(self._store, self._upkeep, self._wake, self._is_stopping)
         self._use(build(config, self._news, self._wake, workers))
 
-    def _use(self, parts: Runtime) -> None:
-        """Work with these parts, from nothing: a scan finds again what was at hand."""
-        self._parts = parts
-        self._reception.use(parts)
-        self._upkeep.use(parts.config)
-        self._settled: deque[Path] = deque()
+    def _use(self, runtime: Runtime) -> None:
+        """Work by another configuration, from nothing: a scan finds again what was at hand."""
+        self._runtime = runtime
+        self._intake.use(runtime)
+        self._upkeep.use(runtime.config)
         self._caught_up = self._retry = False
-        self._calm_in: float | None = None
+        self._returned_in: float | None = None
         self._next_scan = self._next_beat = time.monotonic()
         # files that came while nobody watched settle first
-        self._next_tick = self._next_scan + parts.config.dockserver.settle_seconds + 1.0
+        self._next_tick = self._next_scan + runtime.config.dockserver.settle_seconds + 1.0
 
     def run(self) -> None:
         """Watch until SIGTERM or SIGINT."""
         sys.setswitchinterval(_SWITCH)
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
             signal.signal(number, self._on_signal)
-        self._parts.start()
-        gliders = sorted(self._parts.config.gliders)
+        self._runtime.start()
+        gliders = sorted(self._runtime.config.gliders)
         log.info("watching", pid=os.getpid(), gliders=gliders, state=str(self._state))
         liveness.notify("READY=1", "STATUS=watching")
         try:
             with state_outage.setting_aside(self._state):
                 while not self._stopping:
-                    if not self._trouble.spared(self._turn):
+                    if not self._outage.spared(self._turn):
                         self._caught_up, self._retry = False, True  # what it had begun may be half done
         except transaction.StoppedError:
             pass
-        except DamagedError:  # it is said: the next start makes the state anew
+        except DamagedError:  # it is logged: the next start makes a new state
             raise
         except Exception:
             log.exception("ended by an error")
@@ -198,9 +192,9 @@ class Daemon:
         finally:
             liveness.notify("STOPPING=1")
             self._upkeep.stop()
-            self._parts.stop()
+            self._runtime.stop()
             self._store.close()
-            self._life.end()
+            self._lock.end()
             log.info("stopped")
 
     def _is_stopping(self) -> bool:
@@ -214,151 +208,107 @@ class Daemon:
 
     def _turn(self) -> None:
         """Wait for news or for the next thing that is due, and do what is due; not for ever."""
-        self._hear(self._pause())
+        self._receive(self._pause())
         if time.monotonic() >= self._next_scan:
             self._scan()
         if self._retry:
-            self._retry_waiting()
-        fresh = [path for path in self._parts.settling.ready(time.monotonic()) if self._is_still(path)]
-        if len(fresh) <= _AT_ONCE:  # a few that just came do not wait for a folder full of old ones
-            self._settled.extendleft(reversed(fresh))
-        else:
-            self._settled.extend(fresh)
-        end = time.monotonic() + _LONGEST_TURN
-        for _ in range(min(_AT_ONCE, len(self._settled))):
-            if self._stopping or time.monotonic() > end:
-                break
-            self._reception.judge(self._settled[0])
-            self._settled.popleft()  # only now: when the state cannot be used, it has its turn again
-        if not self._settled or 0 < len(fresh) <= _AT_ONCE:
-            self._parts.feed()  # all that came together is in order of time before the first is taken
-        if not self._settled:
-            self._catch_up()
-        self._calm_in = self._reception.speak_when_calm(time.monotonic())
+            self._retry = False
+            self._intake.retry_waiting()
+        self._intake.judge_settled()
+        self._catch_up()
+        self._returned_in = self._intake.notify_returned(time.monotonic())
         if self._caught_up and time.monotonic() >= self._next_tick:
             self._tick()
         if self._is_idle():
-            self._retention.turn(self._parts.config.state.keep_days, time.time(), time.monotonic())
+            self._retention.turn(self._runtime.config.state.keep_days, time.time(), time.monotonic())
         if time.monotonic() >= self._next_beat:
             self._beat()
 
     def _pause(self) -> float:
         """Seconds until something is due."""
         now = time.monotonic()
-        settled = 0.0 if self._settled else self._parts.settling.next_deadline(now)
+        settled = self._intake.next_settled()
         due = [self._next_scan - now, self._next_beat - now, BEAT if settled is None else settled]
         due += [self._next_tick - now] if self._caught_up else []
         due += [self._retention.pause(now)] if self._is_idle() else []
-        due += [self._calm_in] if self._calm_in is not None else []
+        due += [self._returned_in] if self._returned_in is not None else []
         return max(0.0, min(due))
 
     def _is_idle(self) -> bool:
         """Whether no file is at hand."""
-        return self._caught_up and not self._settled and not self._parts.backlog
+        return self._caught_up and not self._intake.at_hand
 
-    def _hear(self, pause: float) -> None:
-        """Wait for news and heed what has come by then; what comes meanwhile has its turn later."""
+    def _receive(self, pause: float) -> None:
+        """Wait for news and handle what has come by then; what comes meanwhile has its turn later."""
         try:
-            self._heed(self._news.get(timeout=pause))
+            self._handle(self._news.get(timeout=pause))
             for _ in range(self._news.qsize()):
-                self._heed(self._news.get_nowait())
+                self._handle(self._news.get_nowait())
         except Empty:
             return
 
-    def _heed(self, news: News) -> None:
+    def _handle(self, news: News) -> None:
         if self._stopping:
             return
         if isinstance(news, Decoded):
-            self._reception.decoded(news)
+            self._intake.decoded(news)
         elif isinstance(news, FileChanged | ScienceChanged):
-            intake.observe(news.path, self._parts.settling, time.monotonic())
+            self._intake.observe(news.path)
         elif isinstance(news, CacheChanged):
             self._retry = True
         elif news == signal.SIGHUP:
             self._reload()
         elif isinstance(news, EventsLost):
-            log.warning("inotify lost events, all is watched anew", reason="its queue overflowed")
-            self._parts.watcher.restart()
+            log.warning("inotify lost events, all folders are watched again", reason="its queue overflowed")
+            self._runtime.watcher.restart()
             self._next_scan = time.monotonic()
         else:  # a folder came: files may have come in it before it was watched
             self._next_scan = time.monotonic()
 
-    def _is_still(self, path: Path) -> bool:
-        """Whether a file is as it was when it settled; one that has grown since settles anew."""
-        settling = self._parts.settling
-        if intake.state(path) in (None, settling.passed(path)):
-            return True
-        intake.settle_again(path, settling, time.monotonic())
-        return False
-
     def _scan(self) -> None:
         """Look at everything: what the observer missed, what waits, folders that are new."""
         begun = time.monotonic()
-        watcher, settling = self._parts.watcher, self._parts.settling
-        watcher.refresh()
-        there = set()
-        for found in watcher.scan():
-            if self._stopping:
-                return
-            there.add(found.path)
-            settling.observe(found.path, found.size, found.mtime_ns, time.monotonic())
-            if not self._caught_up:  # science files that came while nobody watched
-                for path in intake.newer_science(found.path, self._store):
-                    intake.observe(path, settling, time.monotonic())
-        settling.only(there)
+        self._intake.scan(first=not self._caught_up)
         took = time.monotonic() - begun  # where it takes long there is to be time for more than rescans
-        self._next_scan = begun + took + max(took, self._parts.config.dockserver.rescan_seconds)
+        self._next_scan = begun + took + max(took, self._runtime.config.dockserver.rescan_seconds)
         self._retry = True
-        for problem in watcher.problems:
-            log.warning("folder left out", reason=problem)
-
-    def _retry_waiting(self) -> None:
-        """Look again at the files that wait; one that has changed since has to settle first."""
-        self._retry = False
-        self._parts.decoder.cache_folders = self._parts.cache_folders()
-        for file in self._store.files(Status.WAITING, Status.UNKNOWN):
-            path = Path(file.path)
-            if intake.state(path) in (None, (file.size, file.mtime_ns)):
-                self._reception.judge(path)
-            else:
-                intake.observe(path, self._parts.settling, time.monotonic())
 
     # ------------------------------------------------------------------- life
 
     def _catch_up(self) -> None:
         """After a start, once all files are in: say what an earlier life left unsaid."""
-        if not self._caught_up and not self._parts.backlog:
-            self._reception.speak_of_all()
+        if not self._caught_up and not self._intake.at_hand:
+            self._intake.notify_all()
             self._caught_up = True
 
     def _tick(self) -> None:
         """Say which gliders are overdue, and look again when the next may be."""
-        gliders, speaking = sorted(self._parts.config.gliders), self._parts.speaking
-        now, backlog, reception = time.monotonic(), self._parts.backlog, self._reception
+        gliders, routing = sorted(self._runtime.config.gliders), self._runtime.routing
+        now, backlog, intake = time.monotonic(), self._runtime.backlog, self._intake
 
         def is_busy(glider: str) -> bool:
-            return backlog.more(glider) or not reception.is_calm(glider)
+            return backlog.more(glider) or not intake.is_notified(glider)
 
-        alerts, pause = self._ticking.tick(gliders, speaking, is_busy, time.time(), now)
+        alerts, pause = self._overdue_timer.tick(gliders, routing, is_busy, time.time(), now)
         self._next_tick = now + pause
-        self._reception.alerted(alerts)
+        self._intake.send(alerts)
 
     def _beat(self) -> None:
         """A sign of life, if all parts live; a dead observer is started again."""
         self._next_beat = time.monotonic() + min(BEAT, liveness.watchdog_seconds() or BEAT)
-        watcher, backlog = self._parts.watcher, self._parts.backlog
+        watcher, backlog = self._runtime.watcher, self._runtime.backlog
         if not watcher.alive():
             log.error("observer died, started again")
             watcher.restart()
             self._next_scan = time.monotonic()
         if self._caught_up:
-            self._reception.heed_mutes(time.time())
-        at_hand = len(backlog) + len(self._settled)
-        is_well = self._upkeep.is_well(self._parts.dispatcher, backlog.decoding)
-        self._reception.alerted(self._upkeep.beat(is_well, at_hand))
+            self._intake.notify_unmuted(time.time())
+        at_hand = self._intake.at_hand
+        is_well = self._upkeep.is_well(self._runtime.dispatcher, backlog.decoding)
+        self._intake.send(self._upkeep.beat(is_well, at_hand))
         if not is_well:
             return
-        self._life.beat()
+        self._lock.beat()
         counts = self._store.counts()
         waiting, bad = (counts.get(status, 0) for status in (Status.WAITING, Status.QUARANTINED))
         liveness.notify("WATCHDOG=1", f"STATUS={at_hand} files at hand, {waiting} waiting, {bad} quarantined")
@@ -366,18 +316,18 @@ class Daemon:
     def _reload(self) -> None:
         """Read the configuration again; a bad one is refused and the old one kept."""
         liveness.reloading()
-        before, path = self._parts, str(self._config_path)
+        before, path = self._runtime, str(self._config_path)
         try:
             config = load(self._config_path)
             if Path(config.state.path) != self._state:
                 raise ConfigError("state.path can only be changed by a restart")
             preconditions.require(config, self._config_path)
-            parts = build(config, self._news, self._wake, self._workers, before)
+            runtime = build(config, self._news, self._wake, self._workers, before)
         except GliderwatchError as error:
             log.error("configuration refused, the old one is kept", path=path, reason=str(error))
         else:
-            before.stop(parts)
-            self._use(parts)
-            parts.start(before)
+            before.stop(runtime)
+            self._use(runtime)
+            runtime.start(before)
             log.info("configuration read again", path=path, gliders=sorted(config.gliders))
         liveness.notify("READY=1")

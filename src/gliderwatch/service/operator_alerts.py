@@ -15,7 +15,7 @@ from gliderwatch.config.schema import Operator as Settings
 from gliderwatch.incidents.acknowledgement import with_mute
 from gliderwatch.incidents.constants import GONE
 from gliderwatch.incidents.overdue import outlook
-from gliderwatch.messages import incident_text
+from gliderwatch.messages import notice_text
 from gliderwatch.messages.formatting import duration, utc
 from gliderwatch.model import Alert, Severity
 from gliderwatch.service.routing import Waits, operators, post_alert, waits
@@ -243,7 +243,7 @@ def _ended(key: str, identity: str, since: float, now: float) -> Alert:
 
 
 def _alert(title: str, text: str, now: float, identity: str, thread: str, severity: Severity) -> Alert:
-    made = incident_text.operator(
+    made = notice_text.operator(
         title, text, now, alert_id=identity, severity=severity, audience=Severity.WARNING
     )
     return replace(made, incident=thread)  # so that "over" cannot overtake what it ends

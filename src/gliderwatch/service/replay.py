@@ -9,7 +9,7 @@ import tempfile
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,15 +18,14 @@ from gliderwatch.config import Config, expand
 from gliderwatch.delivery.channels import Channel
 from gliderwatch.delivery.dispatcher import Dispatcher
 from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine, Retry
-from gliderwatch.health.rule import Limits
-from gliderwatch.health.rules import usual_limits
 from gliderwatch.incidents.constants import GONE
 from gliderwatch.messages.formatting import clean
 from gliderwatch.model import Alert, Hindrance, Segment
 from gliderwatch.navigation.clock import Stamp, corrections, is_same, numbered
 from gliderwatch.params import GliderParams
-from gliderwatch.service import intake, transaction
+from gliderwatch.service import judgement, transaction
 from gliderwatch.service.backlog import Job
+from gliderwatch.service.fields import FleetField, fields_of
 from gliderwatch.service.jsonl import alert_line, assessment_line, write_lines
 from gliderwatch.service.liveness import alive_path
 from gliderwatch.service.replay_order import Log, ReplayOrder, find_logs, read_logs
@@ -168,10 +167,6 @@ class Request:
         """The parameters of a glider."""
         return GliderParams() if self.config is None else self.config.glider(glider)
 
-    def limits(self, glider: str) -> Mapping[str, Limits]:
-        """The limits of the rules of health of a glider."""
-        return usual_limits() if self.config is None else self.config.health(glider)
-
     def is_wanted(self, glider: str) -> bool:
         """Whether a glider is to be replayed: the one named, else those of the configuration, else all."""
         if self.glider is not None:
@@ -184,11 +179,12 @@ class Report:
     """What a replay found: files by status with reasons, and the store that holds the rest.
 
     ``clock`` is what time it is for each glider (s): that of its data. ``coming`` is when its files were
-    opened that are not taken yet (s).
+    opened that are not processed yet (s).
     """
 
     store: Store
     ocean: OceanCache | None = None
+    fields: tuple[FleetField, ...] = ()
     files: Counter[Status] = field(default_factory=Counter)
     undelivered: int = 0
     clock: dict[str, float] = field(default_factory=dict)
@@ -199,7 +195,7 @@ def replay(
     request: Request,
     *,
     on_total: Callable[[int], None] = lambda n: None,
-    on_file: Callable[[transaction.FileOutcome], None] = lambda taken: None,
+    on_file: Callable[[transaction.FileOutcome], None] = lambda outcome: None,
     workers: int = 1,
 ) -> Report:
     """Replay the files of some folders in the order of time. Raises GliderwatchError where there are none."""
@@ -213,20 +209,21 @@ def replay(
     with _state(request) as path, tempfile.TemporaryDirectory(prefix="gliderwatch-") as kept:
         lists = SensorLists(Path(kept))
         ocean = None if request.config is None else OceanCache(request.config)
-        report = Report(Store.open(path, durable=False), ocean)
-        with _speaking(request, path, report) as told:
-            jobs = _triage(files, report, lists, request, on_file)
+        fields = () if request.config is None else fields_of(request.config)
+        report = Report(Store.open(path, durable=False), ocean, fields)
+        with _delivery(request, path, report) as routing:
+            jobs = _judge_all(files, report, lists, request, on_file)
             calls = deque(read_logs(logs, report.store, request.is_wanted))
             _check_glider(request, jobs, calls, report.store)
             report.coming = _coming(jobs, calls)
-            turns = ReplayOrder(jobs)
-            for decoded in _decoded(jobs, [*cache_folders(request), lists.folder], workers):
-                for job, sent in turns.after(decoded):
+            order = ReplayOrder(jobs)
+            for decoded in _decoded(jobs, [*cache_folders(request), lists.folder], workers, bool(fields)):
+                for job, sent in order.after(decoded):
                     while calls and calls[0].sent <= sent:
-                        _take_log(calls.popleft(), report, request, told, on_file)
-                    _take(job, sent, report, request, told, on_file)
+                        _process_log(calls.popleft(), report, request, routing, on_file)
+                    _process(job, sent, report, request, routing, on_file)
             for call in calls:
-                _take_log(call, report, request, told, on_file)
+                _process_log(call, report, request, routing, on_file)
         if request.out is not None:
             _write(request.out, report.store)
     return report
@@ -291,8 +288,8 @@ def _fresh(path: Path, config: Config | None) -> Path:
 
 
 @contextmanager
-def _speaking(request: Request, path: Path | str, report: Report) -> Iterator[Routing]:
-    """Who is told: nobody, or with `send` whom the configuration says, until all is delivered."""
+def _delivery(request: Request, path: Path | str, report: Report) -> Iterator[Routing]:
+    """Who is notified: nobody, or with `send` whom the configuration says, until all is delivered."""
     if not request.send or request.config is None:
         yield NOBODY if request.config is None else _silent(request.config)
         return
@@ -319,11 +316,11 @@ def _silent(config: Config) -> Routing:
 
 def _at_once(config: Config) -> Routing:
     """As the configuration says, but nobody waits: what they would have waited for is past."""
-    told = routing_of(config)
-    return replace(told, channels=lambda alert: list(told.channels(alert)))
+    routing = routing_of(config)
+    return replace(routing, channels=lambda alert: list(routing.channels(alert)))
 
 
-def _triage(
+def _judge_all(
     files: Sequence[Path],
     report: Report,
     lists: SensorLists,
@@ -338,7 +335,7 @@ def _triage(
     jobs, noted = list[Job](), list[File]()
 
     def look(path: Path) -> None:
-        found = intake.triage(path, report.store, caches, request.is_wanted)
+        found = judgement.judge(path, report.store, caches, request.is_wanted)
         if isinstance(found, Job):
             lists.keep(path, found.header)
             jobs.append(found)
@@ -396,8 +393,9 @@ def _check_glider(request: Request, jobs: Sequence[Job], calls: Iterable[Log], s
         raise GliderwatchError(f"no files of glider {request.glider}, but of: {', '.join(others)}")
 
 
-def _decoded(jobs: Sequence[Job], caches: Sequence[Path], workers: int) -> Iterator[Job]:
+def _decoded(jobs: Sequence[Job], caches: Sequence[Path], workers: int, science: bool) -> Iterator[Job]:
     with Decoder(caches, max_workers=workers) as decoder:
+        decoder.science = science
         results = decoder.map([Path(job.file.path) for job in jobs if job.result is None])
         for job in jobs:
             if job.result is None:
@@ -405,48 +403,50 @@ def _decoded(jobs: Sequence[Job], caches: Sequence[Path], workers: int) -> Itera
             yield job
 
 
-def _take(
+def _process(
     job: Job,
     sent: float,
     report: Report,
     request: Request,
-    told: Routing,
+    routing: Routing,
     on_file: Callable[[transaction.FileOutcome], None],
 ) -> None:
     """Let the clock run until a file was `sent` (s), and take it."""
     glider = job.header.id.glider
-    params, ticked = request.params(glider), _tick(report, told, sent)
+    params, ticked = request.params(glider), _tick(report, routing, sent)
     try:
         if not isinstance(job.result, Segment):
             raise job.result if job.result is not None else Retry("was not decoded")
         ocean = None if report.ocean is None else report.ocean.field(glider)
-        limits = request.limits(glider)
-        taken = transaction.process_file(
-            report.store, job.file, job.result, params, told, sent, ocean=ocean, limits=limits
+        outcome = transaction.process_file(
+            report.store, job.file, job.result, params, routing, sent, ocean=ocean, fields=report.fields
         )
     except (Quarantine, Retry) as error:
-        taken = transaction.record_file(report.store, intake.failed(job.file, error), params, told, sent)
+        outcome = transaction.record_file(
+            report.store, judgement.failed(job.file, error), params, routing, sent
+        )
     report.coming[glider].popleft()
     report.clock[glider] = max(sent, report.clock.get(glider, sent))
-    _count(replace(taken, alerts=(*ticked, *taken.alerts)), report, on_file)
+    _count(replace(outcome, alerts=(*ticked, *outcome.alerts)), report, on_file)
 
 
-def _take_log(
+def _process_log(
     log: Log,
     report: Report,
     request: Request,
-    told: Routing,
+    routing: Routing,
     on_file: Callable[[transaction.FileOutcome], None],
 ) -> None:
     """Let the clock run until a call was over, and take its log."""
-    glider, is_taken = log.file.glider, log.file.status is Status.TAKEN
-    ticked = _tick(report, told, log.sent) if is_taken else []
-    params, limits = request.params(glider), request.limits(glider)
-    taken = transaction.take_log(report.store, log.file, log.dialog, params, told, log.sent, limits)
-    if is_taken:
+    glider, is_read = log.file.glider, log.file.status is Status.TAKEN
+    ticked = _tick(report, routing, log.sent) if is_read else []
+    outcome = transaction.take_log(
+        report.store, log.file, log.dialog, request.params(glider), routing, log.sent
+    )
+    if is_read:
         report.coming[glider].popleft()
         report.clock[glider] = max(log.sent, report.clock.get(glider, log.sent))
-    _count(replace(taken, alerts=(*ticked, *taken.alerts)), report, on_file)
+    _count(replace(outcome, alerts=(*ticked, *outcome.alerts)), report, on_file)
 
 
 def _coming(jobs: Iterable[Job], calls: Iterable[Log]) -> dict[str, deque[float]]:
@@ -460,36 +460,36 @@ def _coming(jobs: Iterable[Job], calls: Iterable[Log]) -> dict[str, deque[float]
     return {glider: deque(sorted(times)) for glider, times in coming.items()}
 
 
-def _tick(report: Report, told: Routing, until: float) -> list[Alert]:
-    """What a daemon would have said of the silence of all gliders until a time (s), in its order.
+def _tick(report: Report, routing: Routing, until: float) -> list[Alert]:
+    """What a daemon would have reported of all gliders that stay away until a time (s), in its order.
 
     Nothing between two deployments, nor after the last file: a replay knows that a deployment has ended.
     """
     store, alerts = report.store, list[Alert]()
     while True:
-        due = {g: t for g in report.clock if (t := _due(g, report, told, until)) is not None}
+        due = {g: t for g in report.clock if (t := _due(g, report, routing, until)) is not None}
         if not due:
             return alerts
         glider = min(due, key=lambda g: (due[g], g))
-        others = [g for g in store.gliders() if g != glider and not told.attention(g).recovered]
-        alerts += transaction.tick(store, glider, told, others, due[glider])
+        others = [g for g in store.gliders() if g != glider and not routing.attention(g).recovered]
+        alerts += transaction.tick(store, glider, routing, others, due[glider])
         report.clock[glider] = due[glider]
 
 
-def _due(glider: str, report: Report, told: Routing, until: float) -> float | None:
-    """When there is something to say next of a glider's silence, if that is before `until` (s)."""
+def _due(glider: str, report: Report, routing: Routing, until: float) -> float | None:
+    """When there is a message about a glider that stays away, if that is before `until` (s)."""
     now, coming = report.clock[glider], report.coming[glider]
     if not coming or coming[0] - now >= GONE:
         return None
-    at = transaction.next_tick(report.store, glider, told, now)
+    at = transaction.next_tick(report.store, glider, routing, now)
     return at if at is not None and now < at <= until else None
 
 
 def _count(
-    taken: transaction.FileOutcome, report: Report, on_file: Callable[[transaction.FileOutcome], None]
+    outcome: transaction.FileOutcome, report: Report, on_file: Callable[[transaction.FileOutcome], None]
 ) -> None:
-    report.files[taken.file.status] += 1
-    on_file(taken)
+    report.files[outcome.file.status] += 1
+    on_file(outcome)
 
 
 def _write(out: Path, store: Store) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gliderwatch.model import Segment
-from gliderwatch.service import intake
+from gliderwatch.service import judgement
 from gliderwatch.service.backlog import Job
 from gliderwatch.slocum.calls import Dialog
 from gliderwatch.slocum.folders import is_log
@@ -74,5 +74,5 @@ def find_logs(folders: Iterable[Path]) -> list[Path]:
 
 def read_logs(paths: Iterable[Path], store: Store, is_wanted: Callable[[str], bool]) -> list[Log]:
     """The logs at some paths, in the order in which the calls were over."""
-    found = (intake.judge_log(path, store, is_wanted) for path in paths)
+    found = (judgement.judge_log(path, store, is_wanted) for path in paths)
     return sorted((Log(*one) for one in found if one is not None), key=lambda log: (log.sent, log.file.path))

@@ -20,6 +20,7 @@ from gliderwatch.errors import GliderwatchError
 from gliderwatch.model import Segment
 from gliderwatch.sea.ocean_field import Field
 from gliderwatch.service.backlog import Backlog, Job
+from gliderwatch.service.fields import FleetField, fields_of
 from gliderwatch.service.routing import Routing, routing_of
 from gliderwatch.slocum.caches import SensorLists, lists_folder
 from gliderwatch.slocum.decode import Decoder
@@ -103,7 +104,7 @@ class Runtime:
     config: Config
     news: SimpleQueue[News]
     workers: int
-    speaking: Routing
+    routing: Routing
     settling: Settling
     watcher: Watcher
     decoder: Decoder
@@ -111,6 +112,7 @@ class Runtime:
     backlog: Backlog
     dispatcher: Dispatcher
     ocean: OceanCache
+    fields: tuple[FleetField, ...]
     urls: dict[str, str] = field(repr=False)
 
     def start(self, before: Runtime | None = None) -> None:
@@ -169,7 +171,7 @@ def build(
         config.dockserver.observer,
         logs=config.dockserver.logs,
     )
-    ocean, speaks = OceanCache(config), routing_of(config)
+    ocean, routing = OceanCache(config), routing_of(config)
     lists = SensorLists(lists_folder(Path(config.state.path)))
     # shared: what follows can no longer refuse the configuration
     decoder = Decoder((), max_workers=workers) if before is None else before.decoder
@@ -177,7 +179,7 @@ def build(
         config,
         news,
         workers,
-        speaks,
+        routing,
         Settling(config.dockserver.settle_seconds),
         watcher,
         decoder,
@@ -185,7 +187,9 @@ def build(
         Backlog(),
         dispatcher,
         ocean,
+        fields_of(config),
         urls,
     )
+    decoder.science = bool(config.fields)
     decoder.cache_folders = parts.cache_folders()
     return parts

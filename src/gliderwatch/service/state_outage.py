@@ -14,7 +14,7 @@ import structlog
 from gliderwatch.config import Config
 from gliderwatch.errors import DamagedError, StateError
 from gliderwatch.incidents.send_schedule import NO_INCIDENT, deliveries
-from gliderwatch.messages import incident_text
+from gliderwatch.messages import notice_text
 from gliderwatch.model import Alert, Severity
 from gliderwatch.service import logs, operator_alerts
 from gliderwatch.service.liveness import notify
@@ -138,7 +138,7 @@ def _tell(aside: Path, config: Config) -> None:
             f"dockserver; dives of files that are not there any more are lost. {saved} messages, told or to "
             "be told, were saved from it.\nLook after the disk. Delete the damaged file when nobody needs it."
         )
-        return incident_text.operator(
+        return notice_text.operator(
             "the state file was damaged",
             text,
             now,

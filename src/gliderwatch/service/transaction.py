@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 
 from gliderwatch.errors import GliderwatchError, NotAssessed
 from gliderwatch.health.readings import of_call, of_segment
-from gliderwatch.health.rule import Limits
-from gliderwatch.health.rules import usual_limits
-from gliderwatch.incidents import aborts, irregularities, overdue, unjudged
+from gliderwatch.incidents import aborts, health, irregularities, overdue, unjudged
 from gliderwatch.incidents import calls as without_files
-from gliderwatch.incidents.acknowledgement import with_mute
+from gliderwatch.incidents.acknowledgement import Acks, with_mute
 from gliderwatch.incidents.constants import GONE
+from gliderwatch.incidents.notices import Fleet, Notice
 from gliderwatch.incidents.notifications import NotificationState, due_notifications
 from gliderwatch.incidents.send_schedule import AT_ONCE, Wait
-from gliderwatch.messages.overdue_text import Fleet
+from gliderwatch.messages.notice_text import render
 from gliderwatch.model import Alert, Assessment, Segment, SegmentId
 from gliderwatch.navigation.clock import moved
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
 from gliderwatch.sea.ocean_field import Field
+from gliderwatch.service.fields import FieldAdvice, FleetField, look, take
 from gliderwatch.service.routing import Routing, post_alerts, withdraw_answered
 from gliderwatch.slocum.calls import Dialog
 from gliderwatch.store.codec import plain_encode
@@ -30,11 +31,13 @@ from gliderwatch.store.state_file import File, Status, Store
 
 @dataclass(frozen=True, slots=True)
 class FileOutcome:
-    """What an input led to: what became of its file, the dives assessed anew, the messages made."""
+    """What an input led to: what became of its file, the dives assessed anew, the messages made, and where to
+    look next."""
 
     file: File
     assessments: tuple[Assessment, ...] = ()
     alerts: tuple[Alert, ...] = ()
+    advice: tuple[FieldAdvice, ...] = ()
 
 
 class StoppedError(GliderwatchError):
@@ -50,13 +53,13 @@ def process_file(
     now: float,
     stopping: Callable[[], bool] = lambda: False,
     ocean: Field | None = None,
-    limits: Mapping[str, Limits] | None = None,
+    fields: Sequence[FleetField] = (),
 ) -> FileOutcome:
     """Put a segment in its place and go on from the checkpoint before it; say what is to be said.
 
     A copy that holds no more than the one known is only noted. `speaking` is None while more files of the
     glider are at hand: then the last of them speaks for all. `now` (s) is when the file came; `ocean` is a
-    model's field, where dives are compared with one; `limits` are those of the rules of health.
+    model's field, where dives are compared with one; `fields` are those that the gliders measure.
     Raises Quarantine for a segment that cannot be assessed, StoppedError once `stopping` holds; then
     nothing has changed.
     """
@@ -70,10 +73,14 @@ def process_file(
             return FileOutcome(file, alerts=_due_messages(store, glider, params, speaking, now))
         file = replace(file, status=Status.TAKEN, reason="")
         store.note(file, now)
-        assessments = _run(store, segment, params, stopping, ocean)
-        _keep_readings(store, segment, limits)
+        assessments, state = _run(store, segment, params, stopping, ocean)
+        right = moved(segment, store.segments.offset(segment.id))  # by a clock that is right
+        store.health.put(glider, right.id.name, right.last_t, of_segment(right))
+        if fields:
+            take(store, fields, store.segments.kept(segment.id))
+        advice = look(store, fields, glider, state) if speaking is not None else ()
         alerts = _due_messages(store, glider, params, speaking, now)
-    return FileOutcome(file, assessments, alerts)
+    return FileOutcome(file, assessments, alerts, advice)
 
 
 def record_file(
@@ -98,19 +105,18 @@ def take_log(
     params: GliderParams,
     speaking: Routing | None,
     now: float,
-    limits: Mapping[str, Limits] | None = None,
 ) -> FileOutcome:
     """Keep what the log of a call tells by `now` (s), and say what is to be said.
 
-    `dialog` is None where the log could not be read; `limits` are those of the rules of health.
+    `dialog` is None where the log could not be read.
     """
     with store.transaction():
         store.note(file, now)
         if dialog is not None:
             store.calls.keep(file.path, dialog.call, plain_encode(dialog), now)
             call = dialog.call
-            if call.glider and limits != {}:
-                store.health.put(call.glider, file.path, call.last_t, of_call(call), limits or usual_limits())
+            if call.glider:
+                store.health.put(call.glider, file.path, call.last_t, of_call(call))
         alerts = (
             _due_messages(store, file.glider, params, speaking, now) if file.status is Status.TAKEN else ()
         )
@@ -135,11 +141,12 @@ def tick(
     with store.transaction():
         said, hours = store.said(glider), speaking.attention(glider).overdue_hours
         fleet = replace(_fleet(store, others, now), back=_back(store, said.silences))
-        silences, alerts = overdue.tick(said.silences, store.known(glider), fleet, hours, now)
+        silences, due = overdue.tick(said.silences, store.known(glider), fleet, hours, now)
+        alerts = tuple(map(render, due))
         if silences != said.silences:
             channels = _channels(store, silences, speaking)
             post_alerts(store, glider, replace(said, silences=silences), alerts, channels, now)
-    return tuple(alerts)
+    return alerts
 
 
 def _fleet(store: Store, others: Iterable[str], now: float) -> Fleet:
@@ -199,7 +206,7 @@ def _run(
     params: GliderParams,
     stopping: Callable[[], bool],
     ocean: Field | None,
-) -> tuple[Assessment, ...]:
+) -> tuple[tuple[Assessment, ...], GliderState]:
     segments = store.segments
     state, todo = segments.resume(segments.put(segment))
     dives: dict[float, Assessment] = {}
@@ -215,15 +222,7 @@ def _run(
             a.t_dive: a for a in outcome.assessments
         }
     segments.thin(segment.id.glider)
-    return tuple(dives.values())
-
-
-def _keep_readings(store: Store, segment: Segment, limits: Mapping[str, Limits] | None) -> None:
-    """Keep what a segment tells of the glider's health, by a clock that is right; not where no rule is on."""
-    if limits != {}:
-        sent = moved(segment, store.segments.offset(segment.id))
-        readings = of_segment(sent)
-        store.health.put(sent.id.glider, sent.id.name, sent.last_t, readings, limits or usual_limits())
+    return tuple(dives.values()), state
 
 
 def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: Field | None) -> Outcome:
@@ -236,39 +235,52 @@ def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: 
 
 
 def _speak_of_calls(
-    said: NotificationState, known: GliderFacts, now: float
-) -> tuple[NotificationState, list[Alert]]:
+    said: NotificationState, known: GliderFacts, acks: Acks, reminder_hours: float | None, now: float
+) -> tuple[NotificationState, list[Notice]]:
     """What is to be said of what a glider told in its calls."""
     calls = known.calls(now - GONE)
-    episodes, alerts = aborts.announce(known.glider, said.aborts, calls, now)
-    empty, more = without_files.announce(known.glider, said.empty, calls, known.signs(now - GONE), now)
-    return replace(said, aborts=episodes, empty=empty), [*alerts, *more]
+    episodes, notices = aborts.announce(known.glider, said.aborts, calls, now, acks, reminder_hours)
+    signs = known.signs(now - GONE)
+    empty, more = without_files.announce(known.glider, said.empty, calls, signs, now, acks)
+    return replace(said, aborts=episodes, empty=empty), [*notices, *more]
 
 
 def _due_messages(
-    store: Store, glider: str, params: GliderParams, speaking: Routing | None, now: float
+    store: Store,
+    glider: str,
+    params: GliderParams,
+    speaking: Routing | None,
+    now: float,
 ) -> tuple[Alert, ...]:
     if speaking is None:
         return ()
+    store.health.judge(glider, speaking.limits(glider))
     attention = with_mute(speaking.attention(glider), store.notes.muted_until(glider))
     if attention.is_quiet(now):
         withdraw_answered(store, glider, now, quiet=True)
         return ()
     before, known = store.said(glider), store.known(glider)
+    last = known.last_surfacing(inf)
+    advice = store.fields.advice(glider, last.t_surface) if last is not None else []
     silences, heard = overdue.on_calls(before.silences, known, now)
-    said, alerts = due_notifications(
+    said, of_incidents = due_notifications(
         replace(before, silences=silences),
         known,
         params.rules.reminder_hours,
         speaking.notices(glider),
         store.notes.acks(glider),
+        tuple((field, each) for field, _, each in advice),
     )
-    blind, more = unjudged.announce(said.unknown, known, attention, params.rules.reminder_hours, now)
-    ids, notices = irregularities.due(before.irregularities, known.irregularities(now), now)
+    blind, of_watch = unjudged.announce(said.unknown, known, attention, params.rules.reminder_hours, now)
+    ids, of_files = irregularities.due(before.irregularities, known.irregularities(now), now)
     said = replace(said, unknown=blind, irregularities=ids)
-    alerts = [*heard, *notices, *alerts, *more]
-    said, more = _speak_of_calls(said, known, now)
-    alerts += more
+    acks, reminder_hours = store.notes.acks(glider), params.rules.reminder_hours
+    said, of_calls = _speak_of_calls(said, known, acks, reminder_hours, now)
+    rows, fix = store.health.judged(glider), next(reversed(known.places(1)), None)
+    threads, of_health = health.announce(said.health, glider, rows, fix, acks, reminder_hours)
+    said = replace(said, health=threads)
+    due = (*heard, *of_files, *of_incidents, *of_watch, *of_calls, *of_health)
+    alerts = tuple(map(render, due))
     if said != before or alerts:
         post_alerts(store, glider, said, alerts, _channels(store, before.silences, speaking), now)
-    return tuple(alerts)
+    return alerts

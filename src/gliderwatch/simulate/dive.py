@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import asin, atan2, cos, hypot, sin
+from math import asin, atan2, cos, hypot, sin, tan
 from typing import NamedTuple
 
 import gsw
@@ -10,8 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gliderwatch.model import Array
-from gliderwatch.simulate.flight import Vector, along_heading, displacement, nmea, offset, own_speed, turn
-from gliderwatch.simulate.scenario import DiveTruth
+from gliderwatch.simulate.flight import (
+    Vector,
+    along_heading,
+    displacement,
+    nmea,
+    offset,
+    own_speed,
+    steady_glide,
+    turn,
+)
+from gliderwatch.simulate.scenario import DiveTruth, Scenario
 from gliderwatch.simulate.telemetry import CYCLE, SCIENCE_CYCLE
 from gliderwatch.simulate.vehicle import NODE, Flown, Glider, Motion, fly
 
@@ -96,10 +105,11 @@ class Reckoning(NamedTuple):
 
 
 class Way(NamedTuple):
-    """Where the glider really is at the nodes of a dive: times (s), metres east of the sea's origin."""
+    """Where the glider really is at the nodes of a dive: times (s), metres from the sea's origin."""
 
     t: Array
     east: Array
+    north: Array
 
 
 def log_dive(glider: Glider, motion: Motion, course: Course, reckoning: Reckoning) -> None:
@@ -229,7 +239,9 @@ def log_science(glider: Glider, motion: Motion, way: Way) -> None:
     at = np.arange(n) / _PER_CYCLE
     t = way.t[0] + CYCLE * at
     depth = np.interp(at, flight, motion.depth)
-    temperature, salinity = scenario.water.properties(t, np.interp(t, way.t, way.east), depth)
+    temperature, salinity = scenario.water.properties(
+        t, np.interp(t, way.t, way.east), np.interp(t, way.t, way.north), depth
+    )
     pressure = 1.006 * depth
     noise = np.array(_SCIENCE_NOISE)[:, None] * glider.luck.standard_normal((3, n))
     cycles = _PER_CYCLE * glider.cycle + np.arange(n)
@@ -256,7 +268,7 @@ def dive(glider: Glider, segment: str) -> Flown:
     t = glider.times(start + np.arange(n))
     depth = np.clip(motion.depth + _DEPTH_NOISE * rng.standard_normal(n), 0.0, None)
     pitch = motion.pitch + _PITCH_NOISE * rng.standard_normal(n)
-    believed = own_speed(depth, pitch, CYCLE)
+    believed = own_speed(depth, pitch, CYCLE) * _allowance(scenario)
     course = steer(glider, believed)
     kept = np.interp(np.arange(n), NODE * np.arange(len(course.kept)), np.unwrap(course.kept))
     compass = kept + scenario.variation + _COMPASS_NOISE * rng.standard_normal(n)
@@ -265,13 +277,22 @@ def dive(glider: Glider, segment: str) -> Flown:
     east, north = along_heading(motion.speed, kept - glider.health.compass(t), CYCLE)
     at = np.unique(np.append(np.arange(0, n, NODE), n - 1))
     far_east, far_north = glider.carried(t[at], east[at], north[at], motion.depth[at])
-    log_science(glider, motion, Way(t[at], glider.east + east[at] + far_east))
+    way = Way(t[at], glider.east + east[at] + far_east, glider.north + north[at] + far_north)
+    log_science(glider, motion, way)
     end, duration = start + n - 1, CYCLE * (n - 1)
     through = Vector(float(east[-1]) / duration, float(north[-1]) / duration)
     current = Vector(float(far_east[-1]) / duration, float(far_north[-1]) / duration)
     glider.move(end, float(east[-1] + far_east[-1]), float(north[-1] + far_north[-1]))
     truth = _truth(glider, segment, (start, end), motion, float(believed.mean()), through, current)
     return Flown(start, end, Vector(float(reckoning.east[-1]), float(reckoning.north[-1])), truth)
+
+
+def _allowance(scenario: Scenario) -> float:
+    """The part of depth rate over tan(pitch) that the glider takes for its speed."""
+    if not scenario.allowed:
+        return 1.0
+    glide = steady_glide(scenario.pitch, scenario.drive, scenario.airframe)
+    return 1 - scenario.allowed * (1 - tan(scenario.pitch) * glide.horizontal / glide.vertical)
 
 
 def _truth(

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gliderwatch.model import Array
+from gliderwatch.navigation.geodesy import radii
 
 # ----------------------------------------
 # Navigation as a Slocum does it on board, with its own errors. Pure.
@@ -17,7 +18,6 @@ from gliderwatch.model import Array
 # Its frame is turned to magnetic north. `variation` is the sensor `m_gps_mag_var`: the angle from
 # magnetic to true north (rad, west positive), so that a true bearing is the magnetic one less variation.
 
-_A, _E2 = 6378137.0, 6.69437999014e-3
 _FLAT = 0.15
 _SMOOTH = 5
 
@@ -36,12 +36,6 @@ class Vector(NamedTuple):
     north: float
 
 
-def _radii(lat: Array) -> tuple[Array, Array]:
-    """Radii of curvature along the meridian and across it (m), WGS 84, at a latitude (degrees)."""
-    w = 1 - _E2 * np.sin(np.radians(lat)) ** 2
-    return _A * (1 - _E2) / w**1.5, _A / np.sqrt(w)
-
-
 def wrapped(degrees: Array) -> Array:
     """A longitude or a difference of two, brought to -180 to 180 degrees.
 
@@ -53,20 +47,14 @@ def wrapped(degrees: Array) -> Array:
 
 def offset(origin: Point, east: Array, north: Array) -> tuple[Array, Array]:
     """Latitude and longitude (degrees) some tens of kilometres or less from ``origin`` (m)."""
-    meridian, _ = _radii(np.asarray(origin.lat))
-    lat = origin.lat + np.degrees(north / meridian)
-    middle = (lat + origin.lat) / 2
-    _, across = _radii(middle)
-    return lat, wrapped(origin.lon + np.degrees(east / (across * np.cos(np.radians(middle)))))
+    lat = origin.lat + np.degrees(north / radii(origin.lat)[0])
+    return lat, wrapped(origin.lon + np.degrees(east / radii((lat + origin.lat) / 2)[1]))
 
 
 def displacement(origin: Point, to: Point) -> Vector:
     """East and north (m) from one place to another; the inverse of `offset`."""
-    meridian, _ = _radii(np.asarray(origin.lat))
-    middle = (to.lat + origin.lat) / 2
-    _, across = _radii(np.asarray(middle))
-    east = np.radians(wrapped(np.asarray(to.lon - origin.lon))) * across * np.cos(np.radians(middle))
-    return Vector(float(east), float(np.radians(to.lat - origin.lat) * meridian))
+    east = np.radians(wrapped(np.asarray(to.lon - origin.lon))) * radii((to.lat + origin.lat) / 2)[1]
+    return Vector(float(east), float(np.radians(to.lat - origin.lat) * radii(origin.lat)[0]))
 
 
 def turn(vector: Vector, angle: float) -> Vector:

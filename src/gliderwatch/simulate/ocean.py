@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gliderwatch.model import Array, readonly
+from gliderwatch.simulate.stand_in import StandIn
 
 # ----------------------------------------
 # Temperature, salinity and conductivity of a layered sea, and its bottom.
@@ -48,14 +49,19 @@ class Layer:
 
 @dataclass(frozen=True, slots=True)
 class Water:
-    """``temperature`` (degrees Celsius) and practical ``salinity`` at the surface, and the layers below."""
+    """``temperature`` (degrees Celsius) and practical ``salinity`` at the surface, and the layers below; with
+    a ``stand_in`` its temperature is that."""
 
     temperature: float = 24.0
     salinity: float = 35.5
     layers: tuple[Layer, ...] = (Layer(30.0),)
+    stand_in: StandIn | None = None
 
-    def properties(self, t: Array, east: Array, depth: Array) -> tuple[Array, Array]:
-        """Temperature (degrees Celsius) and salinity at times (s), places (m east) and depths (m)."""
+    def properties(self, t: Array, east: Array, north: Array, depth: Array) -> tuple[Array, Array]:
+        """Temperature (degrees Celsius) and salinity at times (s), places (m from the origin) and depths
+        (m)."""
+        if self.stand_in is not None:
+            return self.stand_in.water(t, east, north, depth), np.full(t.shape, self.salinity)
         temperature, salinity = np.full(t.shape, self.temperature), np.full(t.shape, self.salinity)
         for layer in self.layers:
             below = 0.5 * (1 + np.tanh((depth - layer.place(t, east)) / layer.thickness))

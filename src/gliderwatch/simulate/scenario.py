@@ -224,7 +224,8 @@ class Scenario:
     ``start`` (s since 1970) and ``days``; ``place`` of launch and ``waypoints``, gone to in turn;
     ``variation`` is m_gps_mag_var (rad, west positive). ``pitch`` (rad) of each leg is normal with
     ``pitch_sigma``; ``drive`` is the volume moved from neutral (m^3), of which the
-    water makes more or less by the part ``drive_sigma``, wandering within a day; ``depths`` (m) are the upper
+    water makes more or less by the part ``drive_sigma``, wandering within a day; ``allowed`` is the part of
+    the loss by the angle of attack that the glider allows for when it reckons; ``depths`` (m) are the upper
     and lower turns, the lower one varying by ``bottom_sigma``. Where there is a ``bottom`` the glider
     turns ``altitude`` (m) above it. The glider comes up after ``interval`` (s) and talks for a time
     between ``communications`` (s), adrift with ``wind_drift`` (m/s) over the current.
@@ -251,6 +252,7 @@ class Scenario:
     pitch_sigma: float = 0.015
     drive: float = 125e-6
     drive_sigma: float = 0.0
+    allowed: float = 0.0
     depths: tuple[float, float] = (4.0, 60.0)
     bottom_sigma: float = 1.0
     interval: float = 3 * 3600.0
@@ -306,6 +308,8 @@ def _problems(scenario: Scenario) -> list[str]:
         found.append("drive is above 0, at most 1e-3 m3")
     if not 0 <= scenario.drive_sigma <= 0.15:
         found.append("drive_sigma is a part, 0 to 0.15")
+    if not 0 <= scenario.allowed <= 1:
+        found.append("allowed is a part, 0 to 1")
     for science, cadence in ((False, scenario.cadence), (True, scenario.science)):
         try:
             sensor_list(cadence, science=science)

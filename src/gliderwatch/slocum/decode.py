@@ -39,7 +39,15 @@ from gliderwatch.slocum.caches import Scratch, Staging, checksum
 from gliderwatch.slocum.cycles import Sensors, intact, parse_sensor_list
 from gliderwatch.slocum.header import Header, parse_header, plain, read_regular
 from gliderwatch.slocum.science import science_files
-from gliderwatch.slocum.sensors import PRESSURES, SENSORS, TIME, Samples, build_segment, tells_depth
+from gliderwatch.slocum.sensors import (
+    PRESSURES,
+    SCIENCE_SENSORS,
+    SENSORS,
+    TIME,
+    Samples,
+    build_segment,
+    tells_depth,
+)
 
 # ----------------------------------------
 # What a worker process hands back to the daemon: a segment, or why there is none.
@@ -127,25 +135,29 @@ _SCIENCE_TIME = "sci_m_present_time"
 _staging = cache(Staging)
 
 
-def decode(path: Path, cache_folders: Sequence[Path]) -> Segment:
+def decode(path: Path, cache_folders: Sequence[Path], *, science: bool = False) -> Segment:
     """The segment that the file at `path` holds; of a cut or damaged file its intact part.
+
+    With `science` it has the quantities of the science file beside it too, if that is there by now.
 
     Raises `MissingCache` (a `Retry`) while the cache file of a factored header is in none of
     `cache_folders`, `Retry` for what may pass, `Quarantine` for a file that is no use as it is.
     """
+    wanted = (*SENSORS, *SCIENCE_SENSORS) if science else SENSORS
     try:
-        content = _content(path, cache_folders, TIME, SENSORS)
+        content = _content(path, cache_folders, TIME, wanted)
         header, n_cycles, samples, digest = content.header, content.n_cycles, content.samples, content.digest
-        if n_cycles and not tells_depth(samples):
-            science = _science(path, header, cache_folders)
-            if science is not None:
-                n_cycles += science.n_cycles  # with it the copy holds more
-                samples = {**science.samples, **samples}
-                digest.update(science.digest.digest())
+        if n_cycles and (science or not tells_depth(samples)):
+            sensors = SCIENCE_SENSORS if science else PRESSURES[-1:]
+            beside = _science(path, header, cache_folders, sensors)
+            if beside is not None:
+                n_cycles += beside.n_cycles  # with it the copy holds more
+                samples = {**beside.samples, **samples}
+                digest.update(beside.digest.digest())
     except OSError as error:
         raise Retry(f"cannot be read: {error}") from error
     completeness = (folders.rank(header.kind), n_cycles, digest.hexdigest())
-    return build_segment(header, samples, completeness, content.damaged)
+    return build_segment(header, samples, completeness, content.damaged, science=science)
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,17 +171,20 @@ class _Content:
     damaged: int
 
 
-def _science(path: Path, header: Header, cache_folders: Sequence[Path]) -> _Content | None:
-    """The pressure in the science file beside a flight file; None where there is none of the same segment.
+def _science(
+    path: Path, header: Header, cache_folders: Sequence[Path], sensors: Sequence[str]
+) -> _Content | None:
+    """What the science file beside a flight file says of some sensors; None where none of the same segment
+    says anything.
 
     What is wrong with it is no reason to do without the flight file.
     """
     for beside in science_files(path):
         try:
-            found = _content(beside, cache_folders, _SCIENCE_TIME, PRESSURES[-1:], science=True)
+            found = _content(beside, cache_folders, _SCIENCE_TIME, sensors, science=True)
         except (GliderwatchError, OSError):
             continue
-        if found.header.id.name == header.id.name and tells_depth(found.samples):
+        if found.header.id.name == header.id.name and any(len(t) for t, _ in found.samples.values()):
             return found
     return None
 
@@ -263,14 +278,15 @@ def _dbdreader() -> ModuleType:
 
 # --------------------------------------------------------------------------- worker processes
 
-Decode = Callable[[Path, Sequence[Path]], Segment]
+Decode = Callable[..., Segment]
+"""Of a path and cache folders, as `decode`; with `science=True` only where that is wanted."""
 
 
 class Decoder:
     """Decodes in worker processes: whatever a file makes dbdreader do, the daemon lives and goes on.
 
     A task may take `timeout` seconds and one more for each MB, a worker `memory` bytes of
-    address space. `cache_folders` may be replaced at any time.
+    address space. `cache_folders` and `science` may be replaced at any time.
     """
 
     def __init__(
@@ -286,6 +302,8 @@ class Decoder:
         self._max_workers, self._timeout, self._memory, self._decode = max_workers, timeout, memory, decode
         self._scratch = Scratch()
         self._lock = Lock()
+        self.science = False
+        """Whether segments are to have what their science files hold."""
         self._closed = False
         self._pending: set[Future[Segment]] = set()
         # Workers inherit it; nothing here gains from threads of linear algebra.
@@ -304,7 +322,8 @@ class Decoder:
         The future is cancelled when the decoder is closed first. Raises `RuntimeError` after that.
         """
         seconds = self._timeout + _megabytes(path)
-        args = (self._decode, path, self.cache_folders, seconds)
+        decode = partial(self._decode, science=True) if self.science else self._decode
+        args = (decode, path, self.cache_folders, seconds)
         outer: Future[Segment] = Future()
         with self._lock:
             if self._closed:

@@ -45,6 +45,10 @@ _UNITS = {
     "Mbytes": ("B", 1e6),
     "nodim": ("1", 1.0),
     "enum": ("1", 1.0),
+    "degc": ("degC", 1.0),
+    "s/m": ("S/m", 1.0),
+    "bar": ("Pa", 1e5),
+    "um": ("umol/l", 1.0),
 }
 """SI unit and factor of each Slocum unit."""
 
@@ -135,9 +139,22 @@ QUANTITIES = (
     _q("mission_time", "m_present_secs_into_mission", "sec", 0, 1e8, "time since the mission began"),
     _q("heap_free", "m_free_heap", "bytes", 1, 1e9, "free memory of the flight computer"),
     _q("disk_free", "m_disk_free", "Mbytes", 1, 1e12, "free disk of the flight computer"),
+    _q("temperature", "sci_water_temp", "degc", -5, 45, "temperature of the water"),
+    _q("conductivity", "sci_water_cond", "s/m", 0.001, 9, "conductivity of the water"),
+    _q(
+        "science_pressure", "sci_water_pressure", "bar", -1e5, 2e7, "pressure at the CTD, that of the air off"
+    ),
+    _q("oxygen", "sci_oxy4_oxygen sci_oxy3835_oxygen", "um", 0, 800, "oxygen in the water"),
 )
-SENSORS = (TIME, *PRESSURES, *(sensor for quantity in QUANTITIES for sensor in quantity.sensors))
-"""All Slocum sensors that are read where a file has them."""
+SCIENCE = ("temperature", "conductivity", "science_pressure", "oxygen")
+"""Quantities of the science computer, which are read only where a field is to be made of them."""
+SCIENCE_SENSORS = tuple(s for quantity in QUANTITIES if quantity.name in SCIENCE for s in quantity.sensors)
+SENSORS = (
+    TIME,
+    *PRESSURES,
+    *(sensor for quantity in QUANTITIES if quantity.name not in SCIENCE for sensor in quantity.sensors),
+)
+"""Slocum sensors that are read in any case where a file has them."""
 
 _GROUPS = tuple(
     tuple(row for row in QUANTITIES if (row.pair or row.name) == group)
@@ -153,17 +170,25 @@ Samples = Mapping[str, tuple[Array, Array]]
 
 
 def build_segment(
-    header: Header, samples: Samples, completeness: tuple[int, int, str], damaged: int = 0
+    header: Header,
+    samples: Samples,
+    completeness: tuple[int, int, str],
+    damaged: int = 0,
+    *,
+    science: bool = False,
 ) -> Segment:
     """A segment of what was read: `samples` are times (s) and values by Slocum sensor, in Slocum units.
 
-    `damaged` bytes that could not be read are counted in ``Segment.dropped`` as ``bytes``.
+    `damaged` bytes that could not be read are counted in ``Segment.dropped`` as ``bytes``; `science`: with
+    the quantities of `SCIENCE`.
     """
     opened, samples = header.id.opened_at, _with_depth(samples)
     window = (max(opened - _BEFORE, _EARLIEST), opened + _AFTER)
     quantities: dict[str, Series] = {}
     dropped, notes = {"bytes": damaged}, list[str]()
     for rows in _GROUPS:
+        if rows[0].name in SCIENCE and not science:
+            continue
         kept, lost, corrected = _clean(rows, samples, window)
         quantities |= kept
         dropped |= lost

@@ -125,7 +125,7 @@ __all__ = [
     "schema",
 ]
 
-SCHEMA = 8
+SCHEMA = 9
 DELIVERY_BY_WORDS = """CASE
     WHEN delivered_at IS NULL THEN 'pending' WHEN error = '' THEN 'delivered'
     WHEN error LIKE 'withdrawn: %' THEN 'withdrawn' WHEN error LIKE 'given up: %' THEN 'unreadable'
@@ -248,14 +248,51 @@ CREATE TABLE calls (              -- what the log of each call has told
 CREATE INDEX calls_in_order ON calls (glider, last_t);
 """,
     8: """
+CREATE TABLE field_settings (     -- by which settings each field of `fields:` is made
+    field TEXT PRIMARY KEY,
+    key   TEXT NOT NULL
+) STRICT;
+CREATE TABLE field_batches (      -- samples of a segment for a field: `fleet.batches.packed`
+    field   TEXT NOT NULL,
+    id      TEXT NOT NULL,        -- the same at all relays
+    glider  TEXT NOT NULL,
+    first_t REAL NOT NULL,
+    last_t  REAL NOT NULL,
+    data    BLOB NOT NULL,
+    PRIMARY KEY (field, id)
+) STRICT;
+CREATE INDEX field_batches_in_order ON field_batches (field, last_t);
+CREATE TABLE field_checkpoints (  -- what is known after a bin: `fleet.scalar_field.Information`
+    field TEXT NOT NULL,
+    bin   INTEGER NOT NULL,
+    data  BLOB NOT NULL,
+    PRIMARY KEY (field, bin)
+) STRICT;
+CREATE TABLE field_soundings (    -- the least water depth (m) in cells of 0.01 degrees
+    field TEXT NOT NULL,
+    lat   INTEGER NOT NULL,
+    lon   INTEGER NOT NULL,
+    depth REAL NOT NULL,
+    PRIMARY KEY (field, lat, lon)
+) STRICT;
+CREATE TABLE field_advice (       -- where each glider should look next: `fleet.advice.Advice`
+    field  TEXT NOT NULL,
+    glider TEXT NOT NULL,
+    t      REAL NOT NULL,         -- the surfacing
+    data   TEXT NOT NULL,
+    PRIMARY KEY (field, glider)
+) STRICT;
+""",
+    9: """
 CREATE TABLE health (             -- readings of each segment and call, and what the rules found in them
     source   TEXT PRIMARY KEY,    -- name of a segment, or path of a log
     glider   TEXT NOT NULL,
     t        REAL NOT NULL,       -- its last reading, by the glider's clock
     readings TEXT NOT NULL,
-    judged   TEXT NOT NULL        -- `health.rules.Judged`
+    judged   TEXT                 -- `health.rules.Judged`; NULL: it is to be judged
 ) STRICT;
 CREATE INDEX health_in_order ON health (glider, t);
+CREATE INDEX health_to_judge ON health (glider, t) WHERE judged IS NULL;
 """,
 }
 """SQL that leads from the schema before to the one of the key. It may call the functions of
@@ -290,7 +327,7 @@ def guarded(path: Path | str) -> Iterator[None]:
     except (sqlite3.IntegrityError, sqlite3.ProgrammingError, sqlite3.DataError, sqlite3.NotSupportedError):
         raise
     except sqlite3.Error as error:
-        raise _told(path, error) from error
+        raise _state_error(path, error) from error
 
 
 def primary(error: sqlite3.Error) -> int:
@@ -299,7 +336,7 @@ def primary(error: sqlite3.Error) -> int:
     return code & 0xFF
 
 
-def _told(path: Path | str, error: sqlite3.Error) -> StateError:
+def _state_error(path: Path | str, error: sqlite3.Error) -> StateError:
     if primary(error) in DAMAGE:
         return DamagedError(f"state file {path} is damaged: {error}")
     cure = _CURES.get(primary(error))

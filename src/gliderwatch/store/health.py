@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from gliderwatch.health.constants import REMEMBERED
+from gliderwatch.health.constants import REMEMBERED, REPORTED
 from gliderwatch.health.readings import History, Readings, recent
 from gliderwatch.health.rule import Finding, Limits
 from gliderwatch.health.rules import Judged, judge
@@ -37,21 +37,25 @@ class HealthRows:
     def __init__(self, connection: sqlite3.Connection) -> None:
         self._db = connection
 
-    def put(
-        self, glider: str, source: str, t: float, readings: Readings, limits: Mapping[str, Limits]
-    ) -> None:
+    def put(self, glider: str, source: str, t: float, readings: Readings) -> None:
         """Keep the readings of a segment or call, the last of them at ``t`` (s), in place of those that its
-        ``source`` had before; judge it and all that follow by ``limits``."""
+        ``source`` had before; it and all that follow are to be judged (again)."""
         row = self._db.execute("SELECT t FROM health WHERE source = ?", (source,)).fetchone()
         since = t if row is None else min(t, row[0])
         self._db.execute(
-            "INSERT OR REPLACE INTO health VALUES (?, ?, ?, ?, '{}')",
+            "INSERT OR REPLACE INTO health VALUES (?, ?, ?, ?, NULL)",
             (source, glider, t, codec.plain_encode(_packed(readings))),
         )
-        self._judge(glider, since, limits)
+        self._db.execute("UPDATE health SET judged = NULL WHERE glider = ? AND t >= ?", (glider, since))
 
-    def _judge(self, glider: str, since: float, limits: Mapping[str, Limits]) -> None:
-        """Judge anew what has its last reading at a time (s) or later."""
+    def judge(self, glider: str, limits: Mapping[str, Limits]) -> None:
+        """Judge by ``limits`` what is to be judged: once for all files that came together."""
+        if not limits:
+            return
+        sql = "SELECT min(t) FROM health WHERE glider = ? AND judged IS NULL"
+        since: float | None = self._db.execute(sql, (glider,)).fetchone()[0]
+        if since is None:
+            return
         sql = "SELECT t, source, readings FROM health WHERE glider = ? AND t >= ? ORDER BY t, source"
         rows = self._db.execute(sql, (glider, since - REMEMBERED)).fetchall()
         known = [(t, _unpacked(data)) for t, _, data in rows]
@@ -62,10 +66,16 @@ class HealthRows:
                 self._db.execute("UPDATE health SET judged = ? WHERE source = ?", found)
 
     def judged(self, glider: str) -> tuple[tuple[float, Judged], ...]:
-        """What the rules found in each segment and call, in order of time (s)."""
-        sql = "SELECT t, judged FROM health WHERE glider = ? ORDER BY t, source"
-        kind = dict[str, Finding | None]
-        return tuple((t, codec.plain_decode(data, kind)) for t, data in self._db.execute(sql, (glider,)))
+        """What the rules found in each segment and call of the last weeks, in order of time (s)."""
+        if not self._db.execute("SELECT 1 FROM sqlite_schema WHERE name = 'health'").fetchone():
+            return ()  # a state file of an earlier release, which may be looked at
+        sql = (
+            "SELECT t, judged FROM health WHERE glider = ?1 "
+            "AND t >= (SELECT max(t) FROM health WHERE glider = ?1) - ?2 AND judged IS NOT NULL "
+            "ORDER BY t, source"
+        )
+        rows = self._db.execute(sql, (glider, REPORTED))
+        return tuple((t, codec.plain_decode(data, dict[str, Finding | None])) for t, data in rows)
 
 
 def _packed(readings: Readings) -> _Row:

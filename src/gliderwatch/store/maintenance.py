@@ -221,13 +221,13 @@ def damage(path: Path, seconds: float = LOOK) -> str | None:
             timer = threading.Timer(seconds, _interrupt, (db, late))
             timer.start()
             try:
-                told = str(db.execute("PRAGMA quick_check(1)").fetchone()[0])
+                result = str(db.execute("PRAGMA quick_check(1)").fetchone()[0])
             finally:
                 timer.cancel()
                 timer.join()
     except sqlite3.Error as error:  # what else there may be, `database.connect` tells
         return str(error) if primary(error) in DAMAGE else None
-    return None if told == "ok" or late.is_set() else " ".join(told.split())
+    return None if result == "ok" or late.is_set() else " ".join(result.split())
 
 
 def _interrupt(db: sqlite3.Connection, late: threading.Event) -> None:

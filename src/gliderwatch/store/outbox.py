@@ -64,13 +64,13 @@ def post(db: sqlite3.Connection, alert: Alert, channels: Iterable[str], now: flo
 def standing(db: sqlite3.Connection, incident: str, channel: str, now: float) -> tuple[bool, float]:
     """Whether a message of an incident went out by a channel, or is about to, and when what waits there
     escalates (s; infinite: nothing waits)."""
-    told, escalates = db.execute(
+    delivered, escalates = db.execute(
         f"SELECT coalesce(max(iif(o.delivered_at IS NULL, NOT {HELD}, o.delivery = 'delivered')), 0), "
         "coalesce(min(iif(o.delivered_at IS NULL, o.escalates, NULL)), 9e999) "
         "FROM outbox o JOIN alerts a ON a.id = o.alert WHERE o.channel = :channel AND o.incident = :incident",
         {"now": now, "channel": channel, "incident": incident},
     ).fetchone()
-    return bool(told), float(escalates)
+    return bool(delivered), float(escalates)
 
 
 def withdraw(db: sqlite3.Connection, glider: str, unanswered: Collection[str], now: float) -> None:

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 from gliderwatch.incidents.acknowledgement import Ack, Acks
 from gliderwatch.incidents.constants import GONE
-from gliderwatch.incidents.irregularities import PLACES, Coming, Irregularity, found
+from gliderwatch.incidents.irregularities import PLACES, Coming, found
+from gliderwatch.incidents.notices import Irregularity, Unjudged
 from gliderwatch.incidents.overdue import Sign
-from gliderwatch.messages.unjudged_text import Unjudged
 from gliderwatch.model import (
     Assessment,
     Call,

@@ -12,8 +12,10 @@ from gliderwatch.navigation.clock import (
     SAME_OPENING,
     ClockStep,
     Correction,
+    MissionClock,
     Stamp,
     corrections,
+    mission_clock,
     moved,
     numbered,
 )
@@ -35,19 +37,60 @@ def _names(mission: str) -> tuple[str, str]:
     return f"{mission}-", f"{mission}."
 
 
-def correct(db: sqlite3.Connection, glider: str, mission: str) -> dict[SegmentId, SegmentId]:
-    """Put the segments of a mission where they belong in time; the ids before and after of those moved."""
-    rows = _rows(db, glider, mission)
-    stamps = [_stamp(row) for row in rows]
-    moves = {}
-    for row, stamp, new in zip(rows, stamps, corrections(stamps, _start(rows)), strict=True):
-        if new == _correction(row):
-            continue
-        before = SegmentId(row["opened_at"], glider, row["name"])
-        after = SegmentId(stamp.opened_at + new.offset, glider, row["name"])
-        _move(db, before, after, new)
-        moves[before] = after
-    return moves
+class MissionClocks:
+    """The clock of each mission that was looked at, in memory, so that the next segment costs no look at all
+    segments before it. What only the whole mission can tell is looked up there."""
+
+    def __init__(self, connection: sqlite3.Connection) -> None:
+        self._db = connection
+        self._clocks: dict[tuple[str, str], MissionClock] = {}
+
+    def clear(self) -> None:
+        """Know nothing: what is in the state file is another than it was."""
+        self._clocks.clear()
+
+    def correct(self, glider: str, name: str, stamp: Stamp) -> dict[SegmentId, SegmentId]:
+        """Put the segments of a mission where they belong in time, after one was put there under this name;
+        the ids before and after of those moved."""
+        mission = numbered(name)[0]
+        clock = self._clocks.get((glider, mission))
+        new = None if clock is None else clock.next(stamp)
+        if clock is None or new is None:
+            return self._correct_all(glider, mission)
+        self._clocks[glider, mission] = replace(clock, newest=stamp, offset=new.offset)
+        if new == Correction():
+            return {}
+        before = SegmentId(stamp.opened_at, glider, name)
+        after = replace(before, opened_at=stamp.opened_at + new.offset)
+        _move(self._db, before, after, new)
+        return {before: after}
+
+    def _correct_all(self, glider: str, mission: str) -> dict[SegmentId, SegmentId]:
+        rows = _rows(self._db, glider, mission)
+        stamps = [_stamp(row) for row in rows]
+        found = corrections(stamps, _start(rows))
+        self._clocks.pop((glider, mission), None)
+        if (clock := mission_clock(stamps, found)) is not None:
+            self._clocks[glider, mission] = clock
+        moves = {}
+        for row, stamp, new in zip(rows, stamps, found, strict=True):
+            if new == _correction(row):
+                continue
+            before = SegmentId(row["opened_at"], glider, row["name"])
+            after = SegmentId(stamp.opened_at + new.offset, glider, row["name"])
+            _move(self._db, before, after, new)
+            moves[before] = after
+        return moves
+
+    def offset(self, identity: SegmentId) -> float:
+        """What would be added to the time of a segment (s) if it came now; by the glider's clock."""
+        mission, number = numbered(identity.name)
+        own = Stamp(number, identity.opened_at, identity.opened_at)
+        clock = self._clocks.get((identity.glider, mission))
+        if clock is not None and (found := clock.next(own)) is not None:
+            return found.offset
+        rows = [row for row in _rows(self._db, identity.glider, mission) if row["name"] != identity.name]
+        return corrections([own, *map(_stamp, rows)], _start(rows))[0].offset
 
 
 def _rows(db: sqlite3.Connection, glider: str, mission: str) -> list[sqlite3.Row]:
@@ -84,14 +127,6 @@ def _move(db: sqlite3.Connection, before: SegmentId, after: SegmentId, correctio
         (correction.offset, before.glider, before.name, before.opened_at, SAME_OPENING),
     )
     db.execute("DELETE FROM expected WHERE glider = ? AND opened_at = ? AND segment = ?", key)
-
-
-def offset(db: sqlite3.Connection, identity: SegmentId) -> float:
-    """What would be added to the time of a segment (s) if it came now; by the glider's clock."""
-    mission, number = numbered(identity.name)
-    rows = [row for row in _rows(db, identity.glider, mission) if row["name"] != identity.name]
-    own = Stamp(number, identity.opened_at, identity.opened_at)
-    return corrections([own, *map(_stamp, rows)], _start(rows))[0].offset
 
 
 def steps(db: sqlite3.Connection, glider: str) -> list[ClockStep]:
@@ -169,13 +204,14 @@ SPARSE = 16
 class Segments:
     """The segments in a state file, on the connection of its store.
 
-    ``following`` counts the files of the glider that are at hand behind the one that is taken in; ``ahead``
-    has the states that are not written for it.
+    ``following`` counts the files of the glider that are at hand behind the one that is processed; ``ahead``
+    has the states that are not written for it, ``clocks`` the clocks of missions.
     """
 
     def __init__(self, connection: sqlite3.Connection) -> None:
         self._db = connection
         self.ahead, self.following = CheckpointCache(), 0
+        self.clocks = MissionClocks(connection)
 
     def completeness(self, identity: SegmentId) -> tuple[int, int, str] | None:
         """Of the copy of a segment that is held, None when there is none; by the glider's clock."""
@@ -216,6 +252,7 @@ class Segments:
             touched = [SegmentId(old["opened_at"], glider, name)]
             correction = Correction(old["clock_offset"], old["clock_step"])
             self._forget(touched[0])
+            self.clocks.clear()
         self._db.execute(
             "INSERT INTO segments VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, NULL)",
             (
@@ -230,7 +267,8 @@ class Segments:
                 codec.encode(thinned),
             ),
         )
-        moves = correct(self._db, glider, numbered(name)[0])
+        stamp = Stamp(numbered(name)[1], segment.id.opened_at, segment.last_t)
+        moves = self.clocks.correct(glider, name, stamp)
         here = SegmentId(segment.id.opened_at + correction.offset, glider, name)
         return min([moves.pop(here, here), *touched, *moves, *moves.values()])
 
@@ -266,6 +304,13 @@ class Segments:
         """A segment that is held, in its right time."""
         row = self._row(identity)
         return moved(codec.decode(row["segment"], Segment), row["clock_offset"])
+
+    def kept(self, identity: SegmentId) -> Segment:
+        """The copy that is held of a segment by the glider's clock, in its right time."""
+        row = self._held(identity)
+        if row is None:
+            raise KeyError(identity.name)
+        return self.get(SegmentId(row["opened_at"], identity.glider, identity.name))
 
     def as_sent(self, identity: SegmentId) -> Segment:
         """The same in the time of the glider's clock."""

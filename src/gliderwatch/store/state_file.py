@@ -22,6 +22,7 @@ from gliderwatch.pipeline import Outcome
 from gliderwatch.store import codec, outbox, retention, segments
 from gliderwatch.store.codec import File, Status, Undelivered, file_of, values
 from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, read_only
+from gliderwatch.store.fields import Fields
 from gliderwatch.store.health import HealthRows
 from gliderwatch.store.results import Annotations, Calls, GliderFacts
 from gliderwatch.store.segments import RECENT, Segments
@@ -46,7 +47,8 @@ class Store:
     def __init__(self, connection: sqlite3.Connection, path: Path | str = MEMORY) -> None:
         self._db, self._path = connection, path
         self.segments, self.notes = Segments(connection), Annotations(connection)
-        self.calls, self.health = Calls(connection), HealthRows(connection)
+        self.calls, self.fields = Calls(connection), Fields(connection)
+        self.health = HealthRows(connection)
 
     @classmethod
     def open(cls, path: Path | str, *, durable: bool = True) -> Store:
@@ -87,6 +89,8 @@ class Store:
                 self.segments.ahead.commit()
             except BaseException:
                 self.segments.ahead.rollback()
+                self.segments.clocks.clear()
+                self.fields.rollback()
                 if self._db.in_transaction:  # on a full disk SQLite may have ended it by itself
                     self._db.execute("ROLLBACK")
                 raise
@@ -146,12 +150,14 @@ class Store:
 
     def is_past(self, identity: SegmentId) -> bool:
         """Whether a segment is older than what is kept of its glider (`state.keep_days`)."""
-        opened_at = identity.opened_at + segments.offset(self._db, identity)
+        opened_at = identity.opened_at + self.segments.clocks.offset(identity)
         return retention.is_past(self._db, replace(identity, opened_at=opened_at))
 
     def remove(self, before: float) -> Iterator[int]:
         """`retention.remove` of all gliders, in steps."""
-        return retention.remove(self._db, self.transaction, self.gliders(), before)
+        for removed in retention.remove(self._db, self.transaction, self.gliders(), before):
+            self.segments.clocks.clear()
+            yield removed
 
     # ----------------------------------------------------------------- results
 

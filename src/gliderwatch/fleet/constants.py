@@ -1,0 +1,91 @@
+"""The heuristics of the fleet, each with its unit, what it is for, and where it comes from. Pure.
+
+"003" is the paper of the fleet's field. "Stand-in" is the analytic temperature that takes the place of the
+paper's ocean model (`simulate/stand_in.py`), on which `benchmarks/fleet_field.py` measures.
+"""
+
+from __future__ import annotations
+
+# The basis of a field (003, section 5)
+GRID = 7
+"""Gaussians on each axis of the box (003: 7 x 7 x 7)."""
+SPREAD = 0.025
+"""V of the Gaussians exp(-|r|^2 / 2 V), the box being of side 1 (003: V = 0.025 I)."""
+PROFILE = 13
+"""Functions of depth alone, for the mean profile: twice as fine as the field, as a thermocline is."""
+PROFILE_SPREAD = 0.005
+"""V of those: neighbours, 1/12 apart, meet at 0.5 of their height."""
+POINTS = 201
+"""Points an axis of the trapezoid rule for integrals over the box: exact to 1e-9."""
+
+# The filter of a field
+INFORMATION_RATE = 180.0
+"""s that a sample stands for, in squares of the usual deviation, per unit of information: R = 30 at one
+sample in 6 s. What the basis cannot represent is the same error in all samples of a minute (stand-in: with R
+= 0.001 a fleet of 15 is overconfident 24 times in variance)."""
+LONGEST_STAND = 60.0
+"""s that one sample stands for at most: in a minute a glider goes through 10 m of water."""
+MEMORY = 120 * 3600.0
+"""s in which what is known of the field fades (stand-in: best of 48 to 240 h)."""
+PROFILE_MEMORY = 30 * 86400.0
+"""s in which what is known of the mean profile fades: that of the season."""
+FORGOTTEN = 15.0
+"""Memories after which a field is forgotten: of its information 1e-13 is left, and more would overflow."""
+PAPER_VARIANCE = 0.001
+"""Variance of a sample of the literal estimator (003: sigma^2 = 0.001)."""
+PAPER_STEP = 6.0
+"""s between those (003: T = 6 s)."""
+PAPER_WALK = 2e-3 / 3600.0
+"""Variance that a second adds to each coefficient of the literal estimator; 003 leaves Q free."""
+BIN = 3600.0
+"""s: samples of one such bin are taken as of one time. A field changes over days."""
+
+SAMPLE_STEP = 60.0
+"""s: finer samples are averaged to one before they are kept: 6 to 16 m of depth, within a Gaussian's spread
+in a box of 100 m."""
+SENSORS_OF_FIELDS = {
+    "sci_water_temp": (1.0, 15.0, 10.0, "degree_Celsius"),
+    "salinity": (0.2, 33.0, 10.0, "1"),
+    "density": (0.3, 25.0, 10.0, "kg m-3"),
+    "oxygen": (15.0, 250.0, 100.0, "umol l-1"),
+}
+"""Of each sensor of a field: usual deviation from the mean profile, mean and spread of that before any
+sample, and the unit of all three. Upper ocean of middle latitudes; the spread holds the other seas."""
+
+# Where to look next
+HEADINGS = 12
+"""Headings that the look-ahead compares."""
+LOOK_DEPTHS = 12
+"""Depths of the water column over which the gradient is averaged."""
+LEG_SAMPLES = 24
+"""Samples along the next leg by which the look-ahead judges it."""
+APART = 5e3
+"""m that the end of the next leg keeps from other gliders and from the ends of theirs: half the spread of a
+Gaussian on a box of 60 km."""
+
+USUAL_LEG = 3 * 3600.0
+"""s until the next surfacing of a glider of which it is not known."""
+NO_MORE_AT_SEA = 86400.0
+"""s since the last surfacing of another glider after which it is not reckoned with."""
+
+# The flow
+FLOW_SCALE = 60e3
+"""m that are 1 for the basis of the flow; its eddies are sqrt(SPREAD) of it: 9.5 km."""
+NEAR = 60e3
+"""m: neighbours within this tell of a glider's flow."""
+FLOW_MEMORY = 96 * 3600.0
+"""s in which eddies and mean flow forget (fleets of 2 to 8 in the stand-in sea)."""
+FLOW_WINDOW = 10 * 86400.0
+"""s before a dive from which currents are taken: two and a half memories, and 19 periods of M2."""
+EDDY = 0.04
+"""m/s: usual size of the part of the flow that one Gaussian makes."""
+MEAN_FLOW = 0.05
+"""m/s, a component: usual size of the flow that is the same in the whole area."""
+TIDE = 0.06
+"""m/s: usual size of a cosine or sine part of a tide in a component."""
+TIDE_GRADIENT = 0.02
+"""m/s over `FLOW_SCALE`: by how much that differs in space."""
+DAC_NOISE = 0.02
+"""m/s, a component: error of a depth-averaged current of a healthy glider."""
+MOST_CURRENTS = 300
+"""Currents that are taken at most, the nearest in space and time: the rest would only cost time."""

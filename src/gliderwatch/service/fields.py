@@ -1,0 +1,226 @@
+"""The fields of the configuration: what a new segment adds to them, and where its glider should look next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import atan2, hypot, inf
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from gliderwatch.config import Config
+from gliderwatch.errors import GliderwatchError
+from gliderwatch.fleet.advice import Advice, Bounds, Box, Leg, Point, Way, advise, with_planned
+from gliderwatch.fleet.batches import Sensor, batch_of, params_of, whereabouts
+from gliderwatch.fleet.constants import NO_MORE_AT_SEA, USUAL_LEG
+from gliderwatch.fleet.scalar_field import Batch, Checkpoint, FieldParams, at
+from gliderwatch.forecast.outlook import look_ahead
+from gliderwatch.messages.formatting import utc
+from gliderwatch.model import Array, Segment, SegmentId, readonly
+from gliderwatch.navigation.geodesy import to_plane
+from gliderwatch.pipeline import GliderState
+from gliderwatch.store.state_file import Store
+
+
+@dataclass(frozen=True, slots=True)
+class FleetField:
+    """A field of the configuration; ``outputs`` is the folder for advice, None where none is wanted."""
+
+    name: str
+    box: Box
+    sensor: Sensor
+    params: FieldParams
+    bounds: Bounds = Bounds()
+    way: Way = "look_ahead"
+    outputs: Path | None = None
+
+    @property
+    def key(self) -> str:
+        """What of the settings the field is made by."""
+        return msgspec.json.encode((self.box, self.sensor, self.params)).decode()
+
+
+@dataclass(frozen=True, slots=True)
+class FieldAdvice:
+    """What is advised to a glider for a field, at a surfacing ``t`` (s)."""
+
+    field: FleetField
+    glider: str
+    t: float
+    advice: Advice
+
+
+def fields_of(config: Config) -> tuple[FleetField, ...]:
+    """The fields of a configuration, by name."""
+    return tuple(_field(config, name) for name in sorted(config.fields))
+
+
+def _field(config: Config, name: str) -> FleetField:
+    setting = config.fields[name]
+    area, (top, bottom) = setting.box, setting.depth
+    box = Box(area.south, area.west, area.north, area.east, top, bottom)
+    params = params_of(setting.sensor, setting.estimator)
+    if setting.advice is None:
+        return FleetField(name, box, setting.sensor, params)
+    wanted = setting.advice
+    bounds = Bounds(wanted.polygon, wanted.shallowest, apart=wanted.apart_km * 1e3)
+    return FleetField(name, box, setting.sensor, params, bounds, wanted.way, Path(wanted.outputs))
+
+
+def take(store: Store, fields: Sequence[FleetField], segment: Segment) -> None:
+    """Put the samples of a segment into the fields; inside of a transaction.
+
+    A field whose settings have changed is made anew from all segments that are held.
+    """
+    for field in fields:
+        if store.fields.begin(field.name, field.key):
+            store.fields.put(field.name, _all_batches(store, field))
+        batch = batch_of(segment, field.sensor, field.box)
+        if batch is not None:
+            store.fields.put(field.name, [batch])
+        if field.bounds.shallowest is not None:
+            store.fields.sound(field.name, _soundings(segment))
+
+
+def look(
+    store: Store, fields: Sequence[FleetField], glider: str, state: GliderState
+) -> tuple[FieldAdvice, ...]:
+    """Bring the fields up to date; where a glider that has just surfaced should look next, if it lies in
+    them."""
+    out = list[FieldAdvice]()
+    leg = _leg(store, glider, state)
+    for field in fields:
+        newest = store.fields.advance(field.name, field.params)
+        if newest is None or leg is None or field.outputs is None:
+            continue
+        t, way = leg
+        found = _advice(store, field, glider, newest, t, way)
+        store.fields.advise(field.name, glider, t, found)
+        if found is not None:
+            out.append(FieldAdvice(field, glider, t, found))
+    return tuple(out)
+
+
+def _all_batches(store: Store, field: FleetField) -> Iterator[Batch]:
+    for glider in store.gliders():
+        for identity in store.segments.resume(SegmentId(-inf, glider, ""))[1]:
+            batch = batch_of(store.segments.get(identity), field.sensor, field.box)
+            if batch is not None:
+                yield batch
+
+
+def _soundings(segment: Segment) -> Array:
+    """Water depths of a segment ((n, 3): latitude, longitude, m)."""
+    where, depth = whereabouts(segment), segment.get("water_depth")
+    if not len(where.t) or not len(depth):
+        return readonly(np.empty((0, 3)))
+    lat, lon = np.interp(depth.t, where.t, where.lat), np.interp(depth.t, where.t, where.lon)
+    return readonly(np.column_stack([lat, lon, depth.v]))
+
+
+def _leg(store: Store, glider: str, state: GliderState) -> tuple[float, Leg] | None:
+    """The last surfacing of a glider (s), and what it can do until the next one; None: that is not known."""
+    last, outlook = store.known(glider).last_surfacing(inf), look_ahead(state.memory.estimate, None)
+    if last is None or last.lat is None or last.lon is None or outlook is None:
+        return None
+    expected, t = state.memory.expected, last.t_surface
+    duration = expected.t - expected.after if expected is not None else USUAL_LEG
+    speed, _, flow = outlook
+    east, north = flow(t, t + duration)[0].tolist()
+    return t, Leg(last.lat, last.lon, speed, duration, (east, north))
+
+
+def _advice(
+    store: Store, field: FleetField, glider: str, newest: Checkpoint, t: float, leg: Leg
+) -> Advice | None:
+    place = field.box.place(np.array([leg.lat]), np.array([leg.lon]), np.array([field.box.top]))[0]
+    if not ((place >= 0) & (place <= 1)).all() or leg.speed <= 0:
+        return None
+    others, planned = _others(store, glider, t)
+    bounds = Bounds(
+        field.bounds.polygon,
+        field.bounds.shallowest,
+        store.fields.soundings(field.name),
+        others,
+        field.bounds.apart,
+    )
+    known = with_planned(at(newest, t, field.params), planned, field.box, field.params)
+    return advise(known, leg, field.box, bounds, field.params, field.way)
+
+
+def _others(store: Store, glider: str, t: float) -> tuple[tuple[Point, ...], list[tuple[Leg, float]]]:
+    """Where other gliders come up next, or came up last, and the legs that they fly, at a time (s)."""
+    ends, legs = list[Point](), list[tuple[Leg, float]]()
+    for other in store.gliders():
+        known = store.known(other)
+        last = known.last_surfacing(inf)
+        if other == glider or last is None or last.lat is None or last.lon is None:
+            continue
+        if abs(t - last.t_surface) > NO_MORE_AT_SEA:
+            continue
+        expected = known.expected(inf)
+        if expected is None or expected.lat is None or expected.lon is None or expected.t <= t:
+            ends.append((last.lat, last.lon))
+            continue
+        ends.append((expected.lat, expected.lon))
+        east, north = to_plane(expected.lat, expected.lon, last.lat, last.lon).tolist()
+        duration = expected.t - expected.after
+        leg = Leg(last.lat, last.lon, hypot(east, north) / duration, duration)
+        legs.append((leg, atan2(east, north)))
+    return tuple(ends), legs
+
+
+# ----------------------------------------
+# The mission argument of an advice: for a pilot to check and send.
+
+
+def goto_list(advised: FieldAdvice) -> str:
+    """The file of mission arguments that leads a Slocum to a waypoint (behavior `goto_list`)."""
+    advice = advised.advice
+    return f"""behavior_name=goto_list
+# Made by gliderwatch for {advised.glider}, surfaced {utc(advised.t)}. Check it before you send it.
+# Field {advised.field.name}: this leg takes {100 * advice.variance:.1f} % off the mean variance.
+<start:b_arg>
+    b_arg: num_legs_to_run(nodim)   -1
+    b_arg: start_when(enum)          0
+    b_arg: list_stop_when(enum)      7
+    b_arg: initial_wpt(enum)         0
+    b_arg: num_waypoints(nodim)      1
+<end:b_arg>
+<start:waypoints>
+{_degrees_minutes(advice.lon)} {_degrees_minutes(advice.lat)}
+<end:waypoints>
+"""
+
+
+def write_goto(advised: FieldAdvice) -> Path | None:
+    """Write the mission argument into the folder of outputs; its path. Raises GliderwatchError where it
+    cannot."""
+    folder = advised.field.outputs
+    if folder is None:
+        return None
+    path = folder / f"{advised.glider}-{advised.field.name.replace(' ', '_')}-goto.ma"
+    part = path.with_suffix(".tmp")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        part.write_text(goto_list(advised), encoding="ascii", errors="replace")
+        part.replace(path)
+    except OSError as error:
+        raise GliderwatchError(
+            f"{path} cannot be written: {error.strerror}. Let the service write into the folder of "
+            f"fields.{advised.field.name}.advice.outputs, or name another"
+        ) from None
+    return path
+
+
+def _degrees_minutes(value: float) -> str:
+    """A coordinate (degrees) as a Slocum has it: degrees times 100, and minutes.
+
+    >>> _degrees_minutes(-70.504166), _degrees_minutes(41.9999999)
+    ('-7030.2500', '4200.0000')
+    """
+    minutes = round(abs(value) * 60, 4)
+    sign = "-" if value < 0 else ""
+    return f"{sign}{int(minutes // 60) * 100 + minutes % 60:.4f}"
