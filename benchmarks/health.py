@@ -58,14 +58,14 @@ class Fault(NamedTuple):
 
 
 FAULTS = {
-    "abort": Fault(None, 1.0, 4.0, "abort"),
-    "GliderDos": Fault(AilmentKind.GLIDER_DOS, 1.0, 4.0, "abort"),
-    "lastgasp": Fault(AilmentKind.LASTGASP, 1.0, 4.0, "abort"),
-    "leak": Fault(AilmentKind.LEAK, 2.43, 4.0, "leak"),
-    "slow leak, 0.5 inHg a week": Fault(AilmentKind.SLOW_LEAK, 0.5, 8.0, "slow_leak"),
-    "battery ends in 6 days": Fault(AilmentKind.BATTERY, 6.0, 6.0, "battery_end"),
-    "device error": Fault(AilmentKind.DEVICE_ERROR, 2.0, 4.0, "devices"),
-    "low altitude": Fault(AilmentKind.LOW_ALTITUDE, 2.0, 4.0, "altitude"),
+    "abort": Fault(None, 1.0, 1.2, "abort"),
+    "GliderDos": Fault(AilmentKind.GLIDER_DOS, 1.0, 1.2, "abort"),
+    "lastgasp": Fault(AilmentKind.LASTGASP, 1.0, 1.2, "abort"),
+    "leak": Fault(AilmentKind.LEAK, 2.43, 1.2, "leak"),
+    "slow leak, 0.5 inHg a week": Fault(AilmentKind.SLOW_LEAK, 0.5, 5.0, "slow_leak"),
+    "battery ends in 6 days": Fault(AilmentKind.BATTERY, 6.0, 3.0, "battery_end"),
+    "device error": Fault(AilmentKind.DEVICE_ERROR, 2.0, 1.2, "devices"),
+    "low altitude": Fault(AilmentKind.LOW_ALTITUDE, 2.0, 1.2, "altitude"),
 }
 
 
@@ -101,7 +101,7 @@ def faults(name: str, fault: Fault, seeds: int) -> None:
     for seed in range(seeds):
         start = scenario(seed, 1.0).start
         onset = start + (fault.day + 0.031 * seed) * DAY
-        days = fault.day + (4.5 if fault.kind is AilmentKind.SLOW_LEAK else 1.5)
+        days = fault.day + (3.5 if fault.kind is AilmentKind.SLOW_LEAK else 0.8)
         ailment = NEVER if fault.kind is None else Ailment(fault.kind, onset, fault.size)
         abort = (onset - start) / DAY if fault.kind is None else None
         rates = CallRates(RATES.dropped, RATES.no_file, RATES.garbled, abort, "LEAK", RATES.typing)
@@ -123,10 +123,10 @@ def faults(name: str, fault: Fault, seeds: int) -> None:
 def healthy(months: int) -> None:
     """Print what healthy gliders are told of."""
     rates, told = CallRates(RATES.dropped, RATES.no_file, RATES.garbled, typing=RATES.typing), list[str]()
-    for seed in range(100, 100 + months):
-        found, _ = messages(seed, 30.0, NEVER, rates)
+    for month in range(1, months + 1):
+        found, _ = messages(99 + month, 30.0, NEVER, rates)
         told += [a.title for a in found]
-    print(f"healthy, {months} months: {len(told)} messages {told}", flush=True)
+        print(f"healthy, {month} months: {len(told)} messages {told}", flush=True)
 
 
 def main() -> None:

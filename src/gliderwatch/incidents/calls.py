@@ -57,6 +57,33 @@ def _is_one(before: list[Call], call: Call) -> bool:
     return abs(fix.lat - call.fix.lat) <= _PLACE and abs(fix.lon - call.fix.lon) <= _PLACE
 
 
+@dataclass(frozen=True, slots=True)
+class Announced:
+    """A file whose transfer began in a call: its 8.3 ``name``, and the full name of its ``segment`` (empty:
+    not told), lower case."""
+
+    name: str
+    segment: str
+
+
+def announced_flight(call: Call) -> tuple[Announced, ...]:
+    """The flight files (sbd, mbd, dbd, compressed or not) that were announced in a call.
+
+    The call names one segment in both ways (`unit_1033-2025-022-0-33`, `0103.0033`): from that follow the
+    full names of others of the same mission.
+    """
+    mission = call.segment.rpartition("-")[0].lower()
+    found = []
+    for name in call.announced:
+        stem, _, kind = name.lower().rpartition(".")
+        if kind in ("sbd", "scd", "mbd", "mcd", "dbd", "dcd"):
+            is_of_mission = (
+                mission and stem.isdigit() and len(stem) == len(call.short) and stem[:4] == call.short[:4]
+            )
+            found.append(Announced(name.lower(), f"{mission}-{int(stem[4:])}" if is_of_mission else ""))
+    return tuple(found)
+
+
 def announce(
     glider: str,
     before: Empty | None,

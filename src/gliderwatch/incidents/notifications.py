@@ -191,6 +191,11 @@ class OpenThread:
     since: float
     about: str
 
+    @property
+    def glider(self) -> str:
+        """Whose it is."""
+        return self.id.split("/", 1)[0]
+
 
 def open_threads(said: NotificationState) -> tuple[OpenThread, ...]:
     """The aborts, calls without a file and findings of health that were reported and go on."""
