@@ -111,7 +111,7 @@ def faults(name: str, fault: Fault, seeds: int) -> None:
         counts.append(len(told))
         if told:
             hours.append((told[0].time - onset) / 3600)
-            surfacings.append(sum(onset < t <= told[0].time for t, _ in calls))
+            surfacings.append(sum(onset < t <= told[0].time + 2.0 for t, _ in calls))
     once, missed = sum(n == 1 for n in counts), sum(n == 0 for n in counts)
     print(f"{name}: {once} of {seeds} reported once, {missed} missed; surfacings until then", end=" ")
     print(dict(sorted(Counter(surfacings).items())), end="")
