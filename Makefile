@@ -101,9 +101,10 @@ wheelhouse: $(VENV)/installed sbom ## everything a machine without internet need
 lock: ## choose the newest packages anew and write both lock files
 	$(PYTHON) -m venv build/uv
 	build/uv/bin/python -m pip install --quiet uv==$(UV_VERSION)
-	build/uv/bin/uv pip compile $(UV_FLAGS) pyproject.toml -o requirements.lock
-	build/uv/bin/uv pip compile $(UV_FLAGS) -c requirements.lock --group dev pyproject.toml -o requirements-dev.lock
+	build/uv/bin/uv pip compile $(UV_FLAGS) $(EXTRAS) pyproject.toml -o requirements.lock
+	build/uv/bin/uv pip compile $(UV_FLAGS) $(EXTRAS) -c requirements.lock --group dev pyproject.toml -o requirements-dev.lock
 
+EXTRAS = --extra ais --extra web
 UV_FLAGS = --no-config --quiet --upgrade --universal --python-version 3.11 --only-binary :all: \
 	--generate-hashes --custom-compile-command "make lock"
 

@@ -51,8 +51,8 @@ A channel's URL, or any part of it, can come from elsewhere:
 
 | written | comes from |
 | --- | --- |
-| `${NAME}` | environment variable |
-| `${file:PATH}` | text of a file, one line |
+| `${NAME}` | environment variable, for the service a line `NAME=...` in `/etc/default/gliderwatch` |
+| `${file:PATH}` | a file with one line that the service may read |
 | `${credential:NAME}` | systemd credential (`LoadCredential=NAME:PATH` of the service) |
 | `url: {file: PATH}` | a file with the complete URL |
 

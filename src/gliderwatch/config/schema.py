@@ -6,7 +6,7 @@ from ipaddress import ip_address
 from typing import Annotated, Literal
 from zoneinfo import ZoneInfo
 
-from pydantic import Field, IPvAnyAddress, model_validator
+from pydantic import AnyHttpUrl, Field, IPvAnyAddress, model_validator
 
 from gliderwatch.config.fields import (
     AbsolutePath,
@@ -421,6 +421,47 @@ class Operator(Section):
         default=500.0,
         description="Less free space than this in the folder of the state file (MB); null: never.",
     )
+
+
+class Pages(Section):
+    """Pages for pilots as files: of the fleet and of each glider, for any web server."""
+
+    folder: AbsolutePath | None = Field(
+        default=None,
+        description="The folder in which they are kept up to date; made if need be. null: none are written.",
+    )
+
+
+class Web(Section):
+    """The pages live, and links that acknowledge: the command `gliderwatch web`."""
+
+    port: Annotated[int, Field(strict=True, ge=1, le=65535)] = Field(
+        default=8463, description="TCP port that it listens on."
+    )
+    address: IPvAnyAddress = Field(
+        default=ip_address("127.0.0.1"), description="Address of this machine that the port is on."
+    )
+    open_to_network: Annotated[bool, Field(strict=True)] = Field(
+        default=False,
+        description="Whether `address` may be another than loopback. Whoever reaches the port can read where "
+        "all gliders are, without a password.",
+    )
+    public_url: AnyHttpUrl | None = Field(
+        default=None,
+        description="URL under which people reach it, through a tunnel or a reverse proxy.",
+    )
+    link_hours: Annotated[Number, Field(gt=0, le=720)] = Field(
+        default=48.0, description="Hours for which a link acknowledges."
+    )
+
+    @model_validator(mode="after")
+    def _stays_at_home(self) -> Web:
+        if not self.address.is_loopback and not self.open_to_network:
+            raise ValueError(
+                "address is not loopback: other machines could read it. Write 127.0.0.1, or add "
+                "`open_to_network: true`"
+            )
+        return self
 
 
 class Channel(Section):

@@ -180,7 +180,9 @@ def learn(
     )
     if after.bearing is None and state.current is not None and state.speed is not None:
         flown = _flown(after, dive).heading if dive.track is not None else None
-        course = None if flown is None else steered(np.array(flown), state.speed, np.array(state.current))
+        course = None
+        if flown is not None:
+            course = steered(np.array(flown), state.speed, np.array(state.current), state.bearing)
         after = replace(after, bearing=course)
     return _driven(_adrift(_flown(after, dive), state.fix, dive), dive)
 

@@ -44,13 +44,20 @@ LONGEST = 120.0
 class Intake:
     """Takes files from the watcher to the state file.
 
-    `wake` is set when there are messages to deliver; while `is_stopping` nothing is begun any more.
+    `wake` is set when there are messages to deliver, `changed` called with each glider that has news;
+    while `is_stopping` nothing is begun any more.
     """
 
     def __init__(
-        self, store: Store, upkeep: Upkeep, wake: threading.Event, is_stopping: Callable[[], bool]
+        self,
+        store: Store,
+        upkeep: Upkeep,
+        wake: threading.Event,
+        is_stopping: Callable[[], bool],
+        changed: Callable[[str], None],
     ) -> None:
         self._store, self._upkeep, self._wake, self._is_stopping = store, upkeep, wake, is_stopping
+        self._changed = changed
         self._unmuted_until = time.time()
         self._returned: dict[str, tuple[float, float]] = {}
 
@@ -273,11 +280,13 @@ class Intake:
         if before is None or before.status != file.status:  # not once for each line that comes
             self._report(taken)
         else:
+            self._changed(file.glider)
             self.send(taken.alerts)
 
     def _report(self, outcome: transaction.FileOutcome, seconds: float | None = None) -> None:
         logs.taken(outcome)
         self._upkeep.took(outcome, seconds)
+        self._changed(outcome.file.glider)
         self.send(outcome.alerts)
         for advice in outcome.advice:
             try:
@@ -294,6 +303,8 @@ class Intake:
         logs.alerts(alerts)
         if alerts:
             self._wake.set()
+        for alert in alerts:
+            self._changed(alert.glider)
 
     def notify_all(self) -> None:
         """Say what an earlier life left unsaid of any glider."""

@@ -21,6 +21,7 @@ from gliderwatch.model import Segment
 from gliderwatch.sea.ocean_field import Field
 from gliderwatch.service.backlog import Backlog, Job
 from gliderwatch.service.fields import FleetField, fields_of
+from gliderwatch.service.page_writer import PagesWritten
 from gliderwatch.service.routing import Routing, routing_of
 from gliderwatch.slocum.caches import SensorLists, lists_folder
 from gliderwatch.slocum.decode import Decoder
@@ -94,7 +95,7 @@ class Decoded:
         return error if isinstance(error, Exception) else self.future.result()
 
 
-News = Change | Decoded | signal.Signals
+News = Change | Decoded | PagesWritten | signal.Signals
 
 
 @dataclass(frozen=True, slots=True)
