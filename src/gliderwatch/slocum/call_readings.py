@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from gliderwatch.model import Call, CallReading
-from gliderwatch.slocum import logs
-from gliderwatch.slocum.logs import Event
+from gliderwatch.slocum import log_events as events
+from gliderwatch.slocum.log_events import Event
 from gliderwatch.slocum.sensors import QUANTITIES, Quantity
 
 EACH = 10
@@ -31,19 +31,19 @@ def with_readings(call: Call, event: Event, t: float) -> Call:
 
 def _readings(event: Event, t: float) -> Iterator[CallReading]:
     match event:
-        case logs.Reading() if event.age is not None and (q := _BY_SENSOR.get(event.sensor)) is not None:
+        case events.Reading() if event.age is not None and (q := _BY_SENSOR.get(event.sensor)) is not None:
             value = _si(q, event.value)
             if value is not None:
                 yield CallReading(q.name, t - event.age, value)
-        case logs.Counts():
+        case events.Counts():
             yield CallReading("errors:all", t, float(event.errors[0]))
             yield CallReading("warnings:all", t, float(event.warnings[2]))
             yield CallReading("oddities:all", t, float(event.oddities[0]))
-        case logs.Device():
+        case events.Device():
             yield CallReading(f"errors:{event.name}", t, float(event.counts.errors[0]))
-        case logs.Clock() if event.mission_time is not None:
+        case events.Clock() if event.mission_time is not None:
             yield CallReading("mission_time", event.t, event.mission_time)
-        case logs.Housekeeping() if event.name in _HOUSEKEEPING:
+        case events.Housekeeping() if event.name in _HOUSEKEEPING:
             name, scale = _HOUSEKEEPING[event.name]
             if event.value > 0:
                 yield CallReading(name, t, event.value * scale)
