@@ -382,6 +382,7 @@ class Kind(StrEnum):
     ABORT = "abort"
     CALL = "call"
     HEALTH = "health"
+    NEIGHBOURS = "neighbours"
     OPERATOR = "operator"
 
 

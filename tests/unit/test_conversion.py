@@ -14,6 +14,7 @@ from gliderwatch.errors import LayoutError, StateError
 from gliderwatch.estimation import healthy_baseline
 from gliderwatch.incidents.acknowledgement import Ack
 from gliderwatch.incidents.notifications import NotificationState
+from gliderwatch.layers.advice import Layered
 from gliderwatch.model import Alert, Assessment, Incident, Kind, NextSurfacing, Segment
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, process
@@ -31,6 +32,7 @@ ROWS = {
     NotificationState: "said",
     Ack: "acks",
     Alert: "alerts",
+    Layered: "layers",
 }
 
 

@@ -31,6 +31,7 @@ from gliderwatch.model import (
 )
 from gliderwatch.navigation.geodesy import to_plane
 from gliderwatch.pages import writing
+from gliderwatch.pages.reading import SHOWN
 from gliderwatch.pages.render import Frame, file_of, fleet_page, glider_page, page_policy, sheet_page, summary
 from gliderwatch.pages.view import GliderView, verdict, worst_first
 from gliderwatch.params import Attention
@@ -278,7 +279,18 @@ def test_an_acknowledgement_is_seen():
 
 
 def test_the_pages_of_a_long_mission_stay_small():
-    dives = tuple(dive(3.0 * k) for k in reversed(range(150)))
+    names = (
+        "pitch_dive",
+        "pitch_climb",
+        "roll_std",
+        "ballast_dive",
+        "ballast_climb",
+        "vacuum",
+        "across_misfit",
+    )
+    names += ("across_sigma", "depth_rate_dive", "depth_rate_climb", "own_speed", "depth_max", "speed_sigma")
+    evidence = [{name: 0.1 + 0.01 * ((k * len(name)) % 17) for name in names} for k in range(SHOWN)]
+    dives = tuple(dive(3.0 * (SHOWN - k), evidence=evidence[k]) for k in range(SHOWN))
     many = view(dives=dives, incidents=tuple(incident(id=f"i{k}", cleared_at=NOW) for k in range(40)))
     assert max(map(len, all_pages(many))) < 150_000
 

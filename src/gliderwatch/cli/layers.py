@@ -151,9 +151,10 @@ def _summary(preset: Preset, run: Run) -> dict[str, Any]:
 
 def _draw(path: Path, preset: Preset, run: Run) -> None:
     """Depth against value, and both against time, as the figures of 004 have them."""
-    from gliderwatch.score.plots import pyplot
+    from gliderwatch.figures.plots import library
 
-    figure, (profile, way, series) = pyplot().subplots(1, 3, figsize=(14, 4.5), layout="constrained")
+    figure = library().figure.Figure(figsize=(14, 4.5), layout="constrained")
+    profile, way, series = figure.subplots(1, 3)
     step = max(len(run.t) // 2000, 1)
     t, depth, value = run.t[::step], run.depth[::step], run.measured[::step]
     tracking = run.tracking[::step] > 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import click
@@ -44,6 +45,7 @@ def web(config_path: Path, link: str | None, recipient: str | None) -> None:
         entry, is_new = acknowledge_incident(config, incident, by, "", now)
         return f"{entry.incident.id}: {'taken on' if is_new else 'was taken on already'} by {by}."
 
+    sys.setswitchinterval(0.0005)  # who draws must not hold up who answers
     click.echo(f"http://{config.web.address}:{config.web.port}/", err=True)
     uvicorn.run(
         app.application(config, acknowledge),

@@ -214,6 +214,45 @@ class Settings(Preset):
         )
 
 
+class Layers(Section):
+    """Layers of the sea in what the glider measures, and how deep it is advised to fly to keep on them.
+
+    Nothing is ever sent to a glider."""
+
+    sensor: Literal["temperature", "salinity", "density", "oxygen"] = Field(
+        default="temperature", description="The property whose layers are followed."
+    )
+    max_depth: Annotated[Number, Field(gt=0, le=1000)] = Field(
+        description="The deepest that may be advised (m)."
+    )
+    min_depth: Annotated[Number, Field(ge=0, le=200)] = Field(
+        default=10.0, description="The shallowest that may be advised (m): the draught of ships."
+    )
+    altitude: Annotated[Number, Field(ge=0, le=200)] = Field(
+        default=10.0, description="Height above the bottom (m) that is kept."
+    )
+    method: Literal["composite", "filter"] = Field(
+        default="composite",
+        description="`composite`: the gradient of all casts together; `filter`: the filter of paper 004.",
+    )
+    full_casts: Annotated[int, Field(ge=0, le=20)] = Field(
+        default=2, description="Casts over all depths at the begin of each segment; 0: only after a reset."
+    )
+    extension: Annotated[Number, Field(gt=0, le=200)] | None = Field(
+        default=None, description="Added above and below the layer (m); null: two samples, 2 m at least."
+    )
+    outputs: AbsolutePath | None = Field(
+        default=None,
+        description="Folder for the mission arguments `yo`, for a pilot to check and send; null: none.",
+    )
+
+    @model_validator(mode="after")
+    def _has_extent(self) -> Layers:
+        if not self.min_depth < self.max_depth:
+            raise ValueError("min_depth must be above max_depth")
+        return self
+
+
 class Glider(Settings):
     """One glider; every key may be left out (`electa:` alone is enough)."""
 
@@ -233,6 +272,9 @@ class Glider(Settings):
     )
     recovered: Switch = Field(
         default=False, description="It is out of the water: no messages about it, and it is not overdue."
+    )
+    layers: Layers | None = Field(
+        default=None, description="Layers of the sea ([layers](layers.md)); null: off."
     )
 
 

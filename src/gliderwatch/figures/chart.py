@@ -161,8 +161,10 @@ def svg(chart: Chart, land: Land) -> str:
     if not places:
         return ""
     view = frame(places)
+    role = "group" if any(mark.link for mark in chart.marks) else "img"  # an image holds no links
     parts = [
-        f'<svg class="map" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{escape(chart.title)}">',
+        f'<svg class="map" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="{role}" '
+        f'aria-label="{escape(chart.title)}">',
         f"<title>{escape(chart.title)}</title>",
         f'<path class="land" fill-rule="evenodd" d="{_coast(view, land)}"/>',
         *_graticule(view),

@@ -23,6 +23,7 @@ AREA = (0.13, 0.24, 0.85, 0.62)
 """The axes in it: left, bottom, width, height. Fixed: to find the least margins takes as long as the rest."""
 _DASHES = ("-", "--", ":", "-.")
 _DIGITS = re.compile(r"(\d+\.\d)\d+")
+_WHOLE = re.compile(r"(?<=\d)\.0(?=[\sL\"z)])")
 _STYLE = re.compile(r' style="([^"]*)"')
 _FONT = re.compile(r"([\d.]+)px")
 
@@ -179,7 +180,7 @@ def inline(text: str, label: str) -> str:
     text = re.sub(r"\n([LMCQz])", r"\1", text)
     text = _STYLE.sub(lambda found: _attributes(found[1]), text)
     text = re.sub(r' xml:space="preserve"| xmlns:xlink="[^"]*"', "", text).replace("xlink:href", "href")
-    text = _DIGITS.sub(r"\1", text)
+    text = _WHOLE.sub("", _DIGITS.sub(r"\1", text))
     text = text.replace('"#000000"', '"currentColor"').replace('"#262626"', '"currentColor"')
     return re.sub(r"\s*\n\s*", "\n", text).strip()
 

@@ -19,6 +19,11 @@ NEWS = 86400.0
 """s: an incident that was over for longer when it became known is history, not news."""
 REGIME_DIVES = 8
 """Dives back among which a new way of flying is looked for, one that people do not know: a day of 3 h."""
+NEIGHBOURS_IN_A_ROW = 2
+"""Surfacings in a row at which the neighbours show a fault, or none, before that is reported."""
+NEIGHBOURS_AGAIN = 7 * 86400.0
+"""s after which what the neighbours show is reported once more, if they show it: their currents of four days
+count."""
 SPEED_CHANGE = 0.05
 """m/s: a smaller change of a speed that was announced is not worth a correction."""
 FLOW_CHANGE = 0.05

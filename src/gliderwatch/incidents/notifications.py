@@ -14,10 +14,12 @@ from gliderwatch.incidents.acknowledgement import Acks, is_taken_on
 from gliderwatch.incidents.calls import SEVERAL, Empty
 from gliderwatch.incidents.constants import FLOW_CHANGE, NEWS, REGIME_DIVES, SPEED_CHANGE
 from gliderwatch.incidents.health import HealthThread
+from gliderwatch.incidents.neighbours import Comparison
 from gliderwatch.incidents.notices import Cleared, Corrected, NewRegime, Notice, Opened, StillOpen, Surfaced
 from gliderwatch.incidents.overdue import Silence
 from gliderwatch.incidents.send_schedule import next_reminder
 from gliderwatch.incidents.unjudged import Unknown
+from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.model import Assessment, Incident, Kind, NextSurfacing, Severity
 
 # ----------------------------------------
@@ -49,9 +51,10 @@ class NotificationState:
 
         ``surfaced`` is the surfacing of the last notice (s), ``silences`` what was sent of its staying away
     (`incidents.overdue`), ``unknown`` of dives that could not be judged (`incidents.unjudged`), ``aborts`` of
-    aborts (`incidents.aborts`), ``empty`` of calls without a file (`incidents.calls`), ``irregularities`` the
-    ids of those of its files, ``renewed`` the dive (s) of the last notice of a new way of flying, ``health``
-    of what the rules of health found (`incidents.health`).
+    aborts (`incidents.aborts`), ``empty`` of calls without a file (`incidents.calls`), ``neighbours`` how it
+    stood to them (`incidents.neighbours`), ``irregularities`` the ids of those of its files, ``renewed`` the
+    dive (s) of the last notice of a new way of flying, ``health`` what rules of health found
+    (`incidents.health`).
     """
 
     threads: tuple[Thread, ...] = ()
@@ -61,6 +64,7 @@ class NotificationState:
     aborts: tuple[Episode, ...] = ()
     empty: Empty | None = None
     irregularities: tuple[str, ...] = ()
+    neighbours: Comparison | None = None
     renewed: float | None = None
     health: tuple[HealthThread, ...] = ()
 
@@ -88,12 +92,13 @@ def due_notifications(
     notices: bool,
     acks: Acks = NO_ACKS,
     advice: tuple[tuple[str, Advice], ...] = (),
+    layers: LayerAdvice | None = None,
 ) -> tuple[NotificationState, list[Notice]]:
     """The messages to send now, and what will have been said then.
 
     `notices`: whether anyone wants a notice of each surfacing. An incident that somebody has acknowledged
     (`acks`) is not brought to mind, unless it has grown worse since. `advice`: where to look next, by the
-    name of the field.
+    name of the field; `layers`: how deep to fly next.
     """
     latest = known.last_surfacing(float("inf"))
     if latest is None:
@@ -124,7 +129,7 @@ def due_notifications(
         expected = known.expected(float("inf"))
         if expected is not None and expected.after < latest.t_surface:
             expected = None  # of an earlier surfacing: the last dive cannot be used
-        content = Surfaced(latest, previous, expected, advice)
+        content = Surfaced(latest, previous, expected, advice, layers)
         info = Severity.INFO
         alerts.append(
             Notice(identity, "", latest.glider, latest.t_surface, Kind.SURFACING, info, info, content)
@@ -163,7 +168,7 @@ def _new_regime(
 
 def unacknowledged(said: NotificationState, incidents: tuple[Incident, ...], acks: Acks) -> frozenset[str]:
     """The threads of what goes on and nobody has taken on: incidents, and gliders that stay away, cannot be
-    judged, have aborted, or call and send nothing."""
+    judged, have aborted, call and send nothing, or differ from their neighbours."""
     matched = _matched(said.threads, incidents)
     threads = {
         thread.id
@@ -175,6 +180,8 @@ def unacknowledged(said: NotificationState, incidents: tuple[Incident, ...], ack
     if said.unknown is not None and not said.unknown.is_over:
         threads.add(said.unknown.id)
     threads |= {t.id for t in open_threads(said) if not is_taken_on(acks, (t.id,), t.severity)}
+    if said.neighbours is not None and said.neighbours.id:
+        threads.add(said.neighbours.id)
     return frozenset(threads | {silence.id for silence in said.silences if silence.called is None})
 
 

@@ -81,7 +81,7 @@ def follow(
     found = composite(casts, height)
     now = replace(before, layers=layers_of(found, property_name), bin=height)
     last_t = float(casts[-1].t[-1])
-    if before.band is None or before.complete_t is None:
+    if before.complete_t is None or _flew_all(before.band, casts, height):
         now = replace(now, complete_t=last_t)
     lost = _lost(before, now, found, last_t)
     if lost:
@@ -92,6 +92,13 @@ def follow(
     if method is Method.FILTER and before.band is not None:
         return _shifted(now, casts, extension)
     return _tracked(before, now, found, extension)
+
+
+def _flew_all(band: Band | None, casts: Sequence[Cast], height: float) -> bool:
+    """Whether two casts went well below the band: as advised, or because nobody had the advice flown."""
+    if band is None:
+        return True
+    return sum(cast.bottom > band.bottom + 2 * height for cast in casts) >= c.LEAST_CASTS
 
 
 def _lost(before: Tracking, now: Tracking, found: Composite, last_t: float) -> str:
@@ -139,12 +146,14 @@ def _steady(before: Band | None, band: Band, extension: float) -> Band:
 
 def _shifted(now: Tracking, casts: Sequence[Cast], extension: float) -> Tracking:
     """The band moved by the gradient of the cost that the filter of 004 finds along the casts."""
-    assert now.band is not None
-    half = (now.band.bottom - now.band.top) / 2
+    assert now.top is not None
+    assert now.bottom is not None
+    half = (now.bottom - now.top) / 2 + extension
     slope = cost_slope(casts, now.peak)
-    shift = float(np.clip(c.SHIFT * half**2 * slope, -half / 2, half / 2))
-    moved = Band(max(now.band.top + shift, 0.0), max(now.band.bottom + shift, 2 * half))
-    return replace(now, mode=Mode.TRACK, band=_steady(now.band, moved, extension), why="")
+    shift = max(float(np.clip(c.SHIFT * half**2 * slope, -half / 2, half / 2)), extension - now.top)
+    top, bottom = now.top + shift, now.bottom + shift
+    band = _steady(now.band, Band(max(top - extension, 0.0), bottom + extension), extension)
+    return replace(now, mode=Mode.TRACK, band=band, top=top, bottom=bottom, why="")
 
 
 def cost_slope(casts: Sequence[Cast], peak: float) -> float:

@@ -52,3 +52,5 @@ COUNTED = 6
 """Casts that a segment has to have to count in a comparison of methods: shorter ones are test dives."""
 LATITUDE = 45.0
 """Degrees: where depths are made of pressures; elsewhere they are 0.3 % off, less than a sample's spacing."""
+LEAST_BAND = 3.0
+"""m: a band of less height is none: a Slocum overshoots its turns by 1 to 3 m."""

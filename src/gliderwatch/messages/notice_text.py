@@ -15,6 +15,7 @@ from gliderwatch.messages import (
     health_text,
     incident_text,
     irregularity_text,
+    neighbours_text,
     overdue_text,
     unjudged_text,
 )
@@ -42,6 +43,7 @@ _WRITERS: dict[type, Callable[[str, Any], Text]] = {
     n.HealthFound: health_text.found,
     n.HealthReminder: health_text.reminder,
     n.HealthOver: health_text.over,
+    n.DiffersFromNeighbours: neighbours_text.differs,
     n.Irregularity: lambda _, found: _of_operator(*irregularity_text.words(found), found.t),
 }
 """How each content of a notice reads, of which glider."""

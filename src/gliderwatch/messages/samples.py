@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from gliderwatch.fleet.cross_check import Fault, Hypothesis
 from gliderwatch.incidents.notices import (
     Aborted,
     AbortReport,
@@ -18,6 +19,7 @@ from gliderwatch.incidents.notices import (
     Cleared,
     Content,
     Corrected,
+    DiffersFromNeighbours,
     DriftEllipse,
     Fleet,
     NewRegime,
@@ -201,6 +203,12 @@ def _without_file(now: float) -> Alert:
     return _message(Kind.CALL, Severity.WARNING, now, CalledWithoutFile(calls))
 
 
+def _neighbours(now: float) -> Alert:
+    found = Hypothesis("sample", Fault.LOSS, now - 18 * _HOUR, 6, 0.41, 0.06, 43.0)
+    content = DiffersFromNeighbours(found, ("other", "third"), 8e3)
+    return _message(Kind.NEIGHBOURS, Severity.CRITICAL, now, content)
+
+
 def _surfacing(now: float) -> Alert:
     expected = NextSurfacing(now, now + 4 * _HOUR, 1500.0, 24.21, -83.01, 1e6, 0.0, 1e6, "its last dives")
     dive = _at(_HEALTHY, now)
@@ -230,6 +238,7 @@ SAMPLES: dict[Kind, Callable[[float], Alert]] = {
     Kind.UNKNOWN: _unknown,
     Kind.ABORT: _abort,
     Kind.CALL: _without_file,
+    Kind.NEIGHBOURS: _neighbours,
     Kind.ALL_CLEAR: _all_clear,
     Kind.REMINDER: _reminder,
     Kind.CORRECTION: _correction,

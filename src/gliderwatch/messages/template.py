@@ -86,7 +86,8 @@ def with_lead(html: str, line: str) -> str:
 
 def escalated(alert: Alert, waited: float) -> Alert:
     """The message, for who is told it after so long (s) without an acknowledgement."""
-    muted = tuple(f"{alert.glider}/{kind}/" for kind in (Kind.OVERDUE, Kind.UNKNOWN))
+    kinds = (Kind.OVERDUE, Kind.UNKNOWN, Kind.NEIGHBOURS)
+    muted = tuple(f"{alert.glider}/{kind}/" for kind in kinds)
     is_muted = alert.incident.startswith(muted)  # there is no incident to acknowledge
     command = f"mute {alert.glider} --hours 6" if is_muted else f"ack {alert.incident.rstrip('+')}"
     lead = f"Nobody has acknowledged this for {duration(waited)}: that is why you are told. "

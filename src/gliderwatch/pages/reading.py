@@ -12,7 +12,7 @@ from gliderwatch.pages.view import GliderView
 from gliderwatch.params import Attention
 from gliderwatch.store.state_file import Store
 
-SHOWN = 150
+SHOWN = 90
 """Dives of a glider that a page shows at the most."""
 CALLS = 30 * 86400.0
 """Seconds back for which its calls are read."""

@@ -175,13 +175,14 @@ def _plot(panel: plots.Panel) -> Plot:
 
 def _short(view: GliderView) -> list[Fact]:
     """Those of its card on the page of the fleet."""
-    facts = [*_last_call(view), *_next_call(view)]
-    last = view.latest
-    if last is not None:
-        facts += [Fact("Speed", _speed(last), picture=bullet(last))]
-        if view.flow is not None:
-            facts += [Fact("Current", flow(*view.flow))]
-    return [*facts, *_incidents(view), *_muted(view)]
+    return [*_incidents(view), *_last_call(view), *_next_call(view), *_last_dive(view), *_muted(view)]
+
+
+def _last_dive(view: GliderView) -> list[Fact]:
+    if view.latest is None:
+        return []
+    facts = [Fact("Speed", _speed(view.latest), picture=bullet(view.latest))]
+    return facts if view.flow is None else [*facts, Fact("Current", flow(*view.flow))]
 
 
 def _facts(view: GliderView) -> list[Fact]:
@@ -197,12 +198,7 @@ def _facts(view: GliderView) -> list[Fact]:
         facts += [Fact("Now about", f"{place(now.lat, now.lon)}, 95 % within {now.major / 1000:.1f} km")]
     if view.waypoint is not None:
         facts += [Fact("Waypoint", place(*view.waypoint))]
-    last = view.latest
-    if last is not None:
-        facts += [Fact("Speed", _speed(last), picture=bullet(last))]
-        if view.flow is not None:
-            facts += [Fact("Current", flow(*view.flow))]
-    return facts
+    return [*facts, *_last_dive(view)]
 
 
 def _last_call(view: GliderView) -> list[Fact]:

@@ -21,6 +21,7 @@ from gliderwatch.service import judgement, logs, transaction
 from gliderwatch.service.backlog import Job
 from gliderwatch.service.fields import write_goto
 from gliderwatch.service.heartbeat import Upkeep
+from gliderwatch.service.layers import layers_of, write_yo
 from gliderwatch.service.routing import Routing
 from gliderwatch.service.runtime import Decoded, Runtime
 from gliderwatch.slocum import folders
@@ -147,7 +148,7 @@ class Intake:
 
     def _judge_any(self, path: Path) -> None:
         """Of a science file it is the flight file beside it that is judged again, if it lacks the depth, or
-        if there are fields to be made."""
+        if there are fields to be made, or layers of the glider."""
         if folders.is_log(path.name):
             self._read_log(path)
         elif not folders.is_science(path.name):
@@ -155,8 +156,12 @@ class Intake:
         else:
             for flight in flight_files(path):
                 caches = self._runtime.decoder.cache_folders
-                wanted = bool(self._runtime.fields) and judgement.is_as_judged(flight, self._store)
-                if wanted or judgement.lacks_depth(flight, self._store, caches):
+                before = self._store.file(str(flight))
+                layers = before is not None and layers_of(self._runtime.config, before.glider) is not None
+                wanted = bool(self._runtime.fields) or layers
+                if (wanted and judgement.is_as_judged(flight, self._store)) or judgement.lacks_depth(
+                    flight, self._store, caches
+                ):
                     self._judge(flight, again=True)
 
     def _judge(self, path: Path, *, again: bool = False) -> None:
@@ -242,6 +247,7 @@ class Intake:
                     self._is_stopping,
                     ocean,
                     self._runtime.fields,
+                    layers_of(self._runtime.config, glider),
                 )
         except Quarantine as error:
             log.error("file cannot be assessed", path=file.path, glider=glider, exc_info=error.__cause__)
@@ -295,6 +301,20 @@ class Intake:
                 log.error("advice cannot be written", glider=advice.glider, reason=str(error))
             else:
                 log.info("advice written", glider=advice.glider, path=str(path))
+        self._write_yo(outcome)
+
+    def _write_yo(self, outcome: transaction.FileOutcome) -> None:
+        """Write the mission arguments of how deep to fly, where somebody wants them."""
+        glider = outcome.file.glider
+        layers = layers_of(self._runtime.config, glider)
+        if outcome.layers is None or layers is None or layers.outputs is None:
+            return
+        try:
+            paths = write_yo(glider, outcome.layers, layers.outputs)
+        except GliderwatchError as error:
+            log.error("advice cannot be written", glider=glider, reason=str(error))
+        else:
+            log.info("advice written", glider=glider, paths=[str(path) for path in paths])
 
     # --------------------------------------------------------------- messages
 

@@ -125,7 +125,7 @@ __all__ = [
     "schema",
 ]
 
-SCHEMA = 9
+SCHEMA = 10
 DELIVERY_BY_WORDS = """CASE
     WHEN delivered_at IS NULL THEN 'pending' WHEN error = '' THEN 'delivered'
     WHEN error LIKE 'withdrawn: %' THEN 'withdrawn' WHEN error LIKE 'given up: %' THEN 'unreadable'
@@ -284,6 +284,16 @@ CREATE TABLE field_advice (       -- where each glider should look next: `fleet.
 ) STRICT;
 """,
     9: """
+CREATE TABLE layers (             -- layers of the sea after each segment, and the advice that followed
+    glider    TEXT NOT NULL,
+    opened_at REAL NOT NULL,
+    segment   TEXT NOT NULL,
+    t         REAL NOT NULL,      -- of the advice
+    data      TEXT NOT NULL,      -- `layers.advice.Layered`
+    PRIMARY KEY (glider, opened_at, segment)
+) STRICT;
+""",
+    10: """
 CREATE TABLE health (             -- readings of each segment and call, and what the rules found in them
     source   TEXT PRIMARY KEY,    -- name of a segment, or path of a log
     glider   TEXT NOT NULL,

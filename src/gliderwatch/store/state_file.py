@@ -24,6 +24,7 @@ from gliderwatch.store.codec import File, Status, Undelivered, file_of, values
 from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, read_only
 from gliderwatch.store.fields import Fields
 from gliderwatch.store.health import HealthRows
+from gliderwatch.store.layers import LayerRows
 from gliderwatch.store.results import Annotations, Calls, GliderFacts
 from gliderwatch.store.segments import RECENT, Segments
 
@@ -49,6 +50,7 @@ class Store:
         self.segments, self.notes = Segments(connection), Annotations(connection)
         self.calls, self.fields = Calls(connection), Fields(connection)
         self.health = HealthRows(connection)
+        self.layers = LayerRows(connection)
 
     @classmethod
     def open(cls, path: Path | str, *, durable: bool = True) -> Store:
@@ -197,6 +199,14 @@ class Store:
         return values(
             self._db, "SELECT data FROM assessments WHERE glider = ? ORDER BY t_dive", (glider,), Assessment
         )
+
+    def surfaced_between(self, glider: str, start: float, end: float) -> list[Assessment]:
+        """Those of a glider that ended between two times (s) with a fix, in order of time."""
+        sql = (
+            "SELECT data FROM assessments WHERE glider = ? AND ended = 1 AND t_surface BETWEEN ? AND ? "
+            "ORDER BY t_surface"
+        )
+        return values(self._db, sql, (glider, start, end), Assessment)
 
     def incidents(self, glider: str) -> list[Incident]:
         """All of a glider, in order of time."""
