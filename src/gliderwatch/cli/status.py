@@ -18,7 +18,7 @@ from gliderwatch.incidents.notifications import OpenThread, open_threads
 from gliderwatch.incidents.overdue import ExpectedCall, expected_call, guess, is_launched
 from gliderwatch.messages import irregularity_text
 from gliderwatch.messages.formatting import clean
-from gliderwatch.model import Assessment, Incident, NextSurfacing
+from gliderwatch.model import Assessment, Call, Incident, NextSurfacing
 from gliderwatch.params import Attention
 from gliderwatch.service.jsonl import assessment_line, iso
 from gliderwatch.service.liveness import STALE, is_held, seconds_silent
@@ -155,6 +155,7 @@ def _dive(a: Assessment) -> dict[str, Any]:
 # ----------------------------------------
 # What `gliderwatch status` tells: is the daemon alive, how is each glider, what is in the way.
 
+HOUR = 3600.0
 WEEK = 7 * 86400.0
 """Seconds for which `status` tells what a channel refused for good."""
 
@@ -166,6 +167,7 @@ class GliderStatus:
     ``expected`` and ``awaited``: the next surfacing, as known ``at`` a time (s). ``acks``: who has taken
     incidents on. ``irregularities`` of its files in the last 30 days. ``threads`` are what goes on and is no
     incident of dives, ``not_come`` the files that it announced in a call (its time, s) and that never came.
+    ``call`` is its last, where that is later than its last dive that ended: what it told there is news.
     """
 
     name: str
@@ -182,6 +184,7 @@ class GliderStatus:
     irregularities: tuple[Irregularity, ...] = ()
     threads: tuple[OpenThread, ...] = ()
     not_come: tuple[tuple[float, str], ...] = ()
+    call: Call | None = None
 
     @property
     def is_over(self) -> bool:
@@ -289,7 +292,29 @@ def _glider(store: Store, name: str, config: Config, now: float) -> GliderStatus
         recent,
         open_threads(store.said(name)),
         known.not_come(now - GONE, now),
+        _news(known.calls(now - GONE), latest),
     )
+
+
+def _news(calls: tuple[Call, ...], latest: Assessment | None) -> Call | None:
+    """The last call, where it tells of a fix that is later than the last dive that ended."""
+    last = calls[-1] if calls else None
+    if last is None or last.fix is None or (latest is not None and last.fix.t <= latest.t_surface + HOUR):
+        return None
+    return last
+
+
+def _call_as_json(call: Call | None) -> dict[str, Any] | None:
+    """What a glider told of itself in a call, for machines."""
+    if call is None or call.fix is None:
+        return None
+    return {
+        "at": iso(call.last_t),
+        "fix": {"at": iso(call.fix.t), "lat": call.fix.lat, "lon": call.fix.lon},
+        "waypoint": None if call.waypoint is None else {"lat": call.waypoint[0], "lon": call.waypoint[1]},
+        "because": call.reason or None,
+        "mission": call.mission or None,
+    }
 
 
 def status_as_json(view: Overview) -> dict[str, Any]:
@@ -308,6 +333,7 @@ def status_as_json(view: Overview) -> dict[str, Any]:
                     {"since": iso(i.t), "title": irregularity_text.title(i)} for i in g.irregularities
                 ],
                 "open": [incidents_as_json(IncidentEntry(t, g.acks.get(t.id))) for t in g.threads],
+                "last_call": _call_as_json(g.call),
                 "announced_and_not_come": [{"call": iso(t), "file": name} for t, name in g.not_come],
                 **_silence(g),
             }

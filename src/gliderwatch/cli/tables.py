@@ -15,7 +15,7 @@ from gliderwatch.config import Problem
 from gliderwatch.incidents.acknowledgement import Ack
 from gliderwatch.incidents.notifications import OpenThread
 from gliderwatch.messages import irregularity_text
-from gliderwatch.messages.formatting import clean, duration, utc
+from gliderwatch.messages.formatting import clean, duration, place, utc
 from gliderwatch.model import Alert, Assessment, Flag, Incident, Kind, Severity
 from gliderwatch.service.jsonl import iso
 from gliderwatch.store.state_file import File, Status
@@ -152,6 +152,11 @@ def _of_files_and_calls(glider: GliderStatus, console: Console) -> None:
     lines = [
         (_STYLES[t.severity], f"{name}: {t.kind} since {utc(t.since)}: {t.about}") for t in glider.threads
     ]
+    if (call := glider.call) is not None and call.fix is not None:
+        bound = "" if call.waypoint is None else f", bound for {place(*call.waypoint)}"
+        because = f", at the surface because {call.reason}" if call.reason else ""
+        where = f"{name}: at {place(call.fix.lat, call.fix.lon)} by its call of {utc(call.last_t)}"
+        lines.append(("", where + bound + because))
     lines += [
         ("yellow", f"{name}: {file} was announced in the call of {utc(t)} and never came")
         for t, file in glider.not_come

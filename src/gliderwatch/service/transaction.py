@@ -315,7 +315,7 @@ def _due_messages(
     said, of_fleet = _compare(store, said, last, params)
     acks, reminder_hours = store.notes.acks(glider), params.rules.reminder_hours
     said, of_calls = _speak_of_calls(said, known, acks, reminder_hours, now)
-    rows, fix = store.health.judged(glider), next(reversed(known.places(1)), None)
+    rows, fix = store.health.judged(glider), known.last_fix(now - GONE)
     threads, of_health = health.announce(said.health, glider, rows, fix, acks, reminder_hours)
     said = replace(said, health=threads)
     due = (*heard, *of_files, *of_incidents, *of_watch, *of_fleet, *of_calls, *of_health)

@@ -229,14 +229,19 @@ class GliderFacts:
 
     def calls(self, since: float) -> tuple[Call, ...]:
         """Its calls that went on at `since` (s) or later, in order of time."""
+        if not self._db.execute("SELECT 1 FROM sqlite_schema WHERE name = 'calls'").fetchone():
+            return ()  # a state file of an earlier release, which may be looked at
         sql = "SELECT call FROM calls WHERE glider = ? AND last_t >= ? ORDER BY began, path"
         return tuple(values(self._db, sql, (self.glider, since), Call))
+
+    def last_fix(self, since: float) -> Fix | None:
+        """Its last fix, by the surfacings that its files tell, and the calls since a time (s)."""
+        fixes = [*self.places(1), *(call.fix for call in self.calls(since) if call.fix is not None)]
+        return max(fixes, key=lambda fix: fix.t, default=None)
 
     def not_come(self, since: float, now: float) -> tuple[tuple[float, str], ...]:
         """The flight files that it announced in a call that was over since (s), an hour ago at least, and of
         which none came, under whatever name: when that call began (s), and their names in it."""
-        if not self._db.execute("SELECT 1 FROM sqlite_schema WHERE name = 'calls'").fetchone():
-            return ()
         names = {
             row[0].lower()
             for row in self._db.execute("SELECT segment FROM heard WHERE glider = ?", (self.glider,))
