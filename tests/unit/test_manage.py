@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sqlite3
-import time
+import time as clock
 from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, time
@@ -409,7 +409,7 @@ def test_a_state_of_an_earlier_release_is_read_but_not_written(config: Config, t
 def test_status_tells_what_a_later_call_told_and_the_files_that_never_came(
     config: Config, tmp_path: Path
 ) -> None:
-    now = time.time()
+    now = clock.time()
     call = Call(
         "electa",
         "electa.log",
