@@ -29,7 +29,7 @@ from gliderwatch.fleet.constants import APART
 from gliderwatch.incidents import send_schedule
 from gliderwatch.model import Severity
 from gliderwatch.params import AnomalyRule, Attention, FalseAlarmRule, GliderParams, LearnerParams, RuleParams
-from gliderwatch.sea.ocean_field import STALE
+from gliderwatch.sea.constants import STALE
 
 # ----------------------------------------
 # The sections of the settings that are of gliders, as frozen pydantic models.
@@ -483,7 +483,8 @@ class Web(Section):
     )
     public_url: AnyHttpUrl | None = Field(
         default=None,
-        description="URL under which people reach it, through a tunnel or a reverse proxy.",
+        description="URL under which people reach it, through a tunnel or a reverse proxy: messages then end "
+        "with links to the page, and to acknowledge; null: without.",
     )
     link_hours: Annotated[Number, Field(gt=0, le=720)] = Field(
         default=48.0, description="Hours for which a link acknowledges."

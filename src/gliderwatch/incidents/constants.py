@@ -62,7 +62,7 @@ GONE = 30 * 86400.0
 RECENT = GONE + 2 * 86400.0
 """s: files opened before are no sign of life of the last 30 days; none is open for two days."""
 
-# Where a silent glider drifts (the current forgets in `estimation.flow.FlowParams.memory`)
+# Where a silent glider drifts (the current forgets in `sea.constants.PASSING_MEMORY`)
 FLOW_SIGMA = 0.15
 """m/s, a component: how far current and wind drift come to differ from the last known current. 0.11 is
 sqrt(2) times the 0.08 of the current itself; the rest is allowed for the wind at the surface."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import degrees, hypot
 from typing import Literal
 
+from gliderwatch.estimation.constants import ROLL_STEP
 from gliderwatch.messages.formatting import angle, clean, known, speed, utc
 from gliderwatch.model import Assessment, Flag, Incident, Kind
 
@@ -374,7 +375,8 @@ def _check_slow(incident: Incident, a: Assessment) -> tuple[str, ...]:
     )
     depth = _here(_beside_usual(a, "depth_max", "{} m", lambda x: f"{x:.0f}"))
     return (
-        f"Roll: a step above {ROLL_OF_ANY:.0f} degrees since the dives before is a lost wing or a load{roll}",
+        f"Roll: a step above {_DEGREES * ROLL_STEP:.0f} degrees since the dives before is a lost wing or a "
+        f"load{roll}",
         f"Climb time at full ballast or oil volume: slow means drag or weight (remora, net, growth){rates}",
         f"Pitch in dive against climb, and the battery position it takes{pitch}",
         f"Depth reached against depth commanded, and altitude: bottom contact or entanglement{depth}",
