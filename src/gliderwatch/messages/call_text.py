@@ -7,8 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from gliderwatch.incidents.notices import Aborted, AbortReport, CalledWithoutFile, Resumed, SendsAgain
-from gliderwatch.messages.formatting import clean, map_link, place, utc
+from gliderwatch.incidents.notices import (
+    Aborted,
+    AbortReport,
+    CalledWithoutFile,
+    Resumed,
+    SendsAgain,
+    StillAborted,
+)
+from gliderwatch.messages.formatting import clean, duration, map_link, place, utc
 from gliderwatch.messages.template import Page, Text
 from gliderwatch.model import Call, Happening
 
@@ -62,6 +69,18 @@ def aborted(glider: str, content: Aborted) -> Text:
         (("Check", _checks(content.reports)),),
     )
     return f"{name} {_title(main)}", page
+
+
+def still_aborted(glider: str, content: StillAborted) -> Text:
+    """The glider still flies no mission of its pilots."""
+    main, name = content.reports[0], clean(glider, 40)
+    since = duration(3600 * content.hours)
+    page = Page(
+        (f"{name}: for {since} now it flies no mission of yours.", f"It reported: {_sentence(main)}."),
+        (("Since", utc(main.t)), *_facts(content.call)),
+        (("Check", _checks(content.reports)),),
+    )
+    return f"REMINDER {name} {_title(main)}", page
 
 
 def resumed(glider: str, content: Resumed) -> Text:

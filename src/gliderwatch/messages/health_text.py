@@ -1,0 +1,137 @@
+"""What people read of a rule of health: what it found, the rule, and the last readings as a small plot. Pure.
+
+The guides' first advice is to look at the plot before believing the trigger.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from gliderwatch.health.constants import ATMOSPHERE, COOL, FULL, INHG
+from gliderwatch.health.rule import Finding
+from gliderwatch.health.rules import RULES
+from gliderwatch.incidents.notices import HealthFound, HealthIncident, HealthOver, HealthReminder
+from gliderwatch.messages.formatting import clean, duration, map_link, place, utc
+from gliderwatch.messages.template import Page, Text
+from gliderwatch.model import Fix
+
+_BLOCKS = "▁▂▃▄▅▆▇█"
+_CHECKS = {
+    "leak": ("the log: does it abort? A leak in the science bay leaves time, one in the pump does not",),
+    "slow_leak": ("the vacuum of the last weeks, at depth alone", "where it can be recovered, and how soon"),
+    "battery_end": ("what was switched on: thruster, science, calls", "move the recovery, or save power"),
+    "devices": ("the listing of devices in the log (`use`)", "does the device answer to a `put ... 1`?"),
+    "altitude": ("the altimeter, and the depth of the water there", "`u_alt_min_depth`, the depth of the yo"),
+    "roll": ("a lost wing or a load: speed and steering",),
+    "cut_calls": ("the quality of the connection; the other number",),
+    "mission_time": ("end the mission and start it again before it aborts by OVERTIME",),
+}
+"""What to look at for some rules, beside the plot."""
+
+
+class _Shown(NamedTuple):
+    """How a quantity is shown: times a factor, plus an offset, with a unit and so many decimals."""
+
+    factor: float = 1.0
+    offset: float = 0.0
+    unit: str = ""
+    decimals: int = 2
+
+
+_SHOWN = {
+    "vacuum": _Shown(1 / INHG, unit=" inHg"),
+    "gas_density": _Shown(-COOL / INHG, ATMOSPHERE / INHG, " inHg at 15 degrees C"),
+    "gas_density_surface": _Shown(-COOL / INHG, ATMOSPHERE / INHG, " inHg at 15 degrees C"),
+    "leak_voltage": _Shown(unit=" V", decimals=3),
+    "leak_voltage_forward": _Shown(unit=" V", decimals=3),
+    "leak_voltage_science": _Shown(unit=" V", decimals=3),
+    "digifin_leak": _Shown(decimals=0),
+    "battery_voltage": _Shown(unit=" V"),
+    "battery_charge": _Shown(100.0, unit=" %", decimals=1),
+    "charge_used": _Shown(1 / FULL, unit=" Ah", decimals=1),
+    "mission_time": _Shown(1 / 86400, unit=" days", decimals=1),
+    "heap_free": _Shown(1e-3, unit=" kB", decimals=0),
+    "disk_free": _Shown(1e-6, unit=" MB", decimals=0),
+    "fix_age": _Shown(1 / 60, unit=" min", decimals=0),
+    "call_cut": _Shown(decimals=0),
+    "altitude": _Shown(unit=" m", decimals=1),
+    "roll_in_flight": _Shown(float(np.degrees(1)), unit=" degrees", decimals=0),
+    "battery_position_error": _Shown(1e3, unit=" mm", decimals=1),
+    "fin_error": _Shown(float(np.degrees(1)), unit=" degrees", decimals=1),
+    "ballast_error": _Shown(1e6, unit=" cc", decimals=0),
+    "oil_volume_error": _Shown(1e6, unit=" cc", decimals=0),
+}
+
+
+def found(glider: str, content: HealthFound) -> Text:
+    """A rule found something, or something worse than before."""
+    incident, name = content.incident, clean(glider, 40)
+    finding = incident.worst if content.is_worse else incident.last
+    again = "is worse now: " if content.is_worse else ""
+    lead = f"{name}: {again}{finding.text}."
+    return f"{name} {_title(incident)}: {finding.text}", _page(lead, incident, finding, content.fix)
+
+
+def reminder(glider: str, content: HealthReminder) -> Text:
+    """It is still so."""
+    incident, name = content.incident, clean(glider, 40)
+    since = duration(3600 * content.hours)
+    lead = f"{name}: for {since} now: {incident.last.text}. Nobody has acknowledged it."
+    title = f"REMINDER {name} {_title(incident)}: for {since}"
+    return title, _page(lead, incident, incident.last, content.fix)
+
+
+def over(glider: str, content: HealthOver) -> Text:
+    """It is over, or data that came late have shown that it was never so."""
+    incident, name = content.incident, clean(glider, 40)
+    what = "was not so: data that came late show it" if content.is_withdrawn else "is over"
+    lead = f"{name}: {_title(incident).lower()} {what}. It was reported: {incident.last.text}."
+    title = f"ALL CLEAR {name}: {_title(incident).lower()} {what}"
+    return title, _page(lead, incident, incident.last, content.fix)
+
+
+def _title(incident: HealthIncident) -> str:
+    return incident.rule.replace("_", " ").upper()
+
+
+def _page(lead: str, incident: HealthIncident, finding: Finding, fix: Fix | None) -> Page:
+    about = next((rule.about for rule in RULES if rule.name == incident.rule), "")
+    lat, lon = (None, None) if fix is None else (fix.lat, fix.lon)
+    link = map_link(lat, lon)
+    facts = (
+        ("Since", utc(incident.since)),
+        *((("Last values", plot(finding)),) if finding.last else ()),
+        ("Rule", f"{about} Its limits: `health.{incident.rule}` in the configuration"),
+        ("Where", place(lat, lon)),
+        *((("Map", link),) if link else ()),
+    )
+    checks = ("plot more of these values before you believe it", *_CHECKS.get(incident.rule, ()))
+    return Page((lead,), facts, (("Check", checks),))
+
+
+def plot(finding: Finding) -> str:
+    """The last readings of a finding as a line of blocks, with the first, the last, and their times."""
+    shown = _SHOWN.get(finding.quantity, _Shown(decimals=0))
+    values = [value * shown.factor + shown.offset for _, value in finding.last]
+    first, last = (f"{v:.{shown.decimals}f}{shown.unit}" for v in (values[0], values[-1]))
+    times = f"{utc(finding.last[0][0])} to {utc(finding.last[-1][0])}"
+    what = finding.quantity.replace("_", " ").replace(":", " of ")
+    return f"{blocks(values)} {clean(what, 60)} {first} to {last}, {times}"
+
+
+def blocks(values: Sequence[float]) -> str:
+    """Values as block characters: the lowest is the lowest block, the highest the highest.
+
+    >>> blocks([0.0, 1.0, 2.0, 7.0])
+    '▁▂▃█'
+    >>> blocks([5.0, 5.0])
+    '▄▄'
+    """
+    low, high = min(values), max(values)
+    if high <= low:
+        return _BLOCKS[3] * len(values)
+    top = len(_BLOCKS) - 1
+    return "".join(_BLOCKS[round((v - low) / (high - low) * top)] for v in values)
