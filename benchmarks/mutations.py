@@ -37,6 +37,7 @@ TESTS = {
     "estimation": "unit/test_heuristics_estimation unit/test_speed unit/test_consistency unit/test_range"
     " unit/test_baseline unit/test_evidence_usual unit/test_reckoned unit/test_sequential"
     " unit/test_learner unit/test_adaptive unit/test_glider_estimate unit/test_joint",
+    "layers": "unit/test_heuristics_layers unit/test_layers unit/test_layer_advice unit/test_layers_water",
     "forecast": "unit/test_heuristics_forecast unit/test_forecast_flow unit/test_forecast_steering"
     " unit/test_forecast_surfacing unit/test_forecast_timing unit/test_forecast_waypoints"
     " property/test_forecast",
