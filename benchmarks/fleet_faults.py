@@ -109,7 +109,14 @@ def run(job: Job) -> Result:
             mission = simulate(scenario)
             write_mission(folder / "gliders", folder / "cache", mission)
             write_cache(folder / "cache", mission)
-        cost("run", "--replay", folder / "gliders", "--cache", folder / "cache", "--out", folder / "out")
+        config = folder / "gliderwatch.yml"
+        config.write_text(
+            f"dockserver: {{roots: [{folder / 'gliders'}], cache: [{folder / 'cache'}]}}\n"
+            f"state: {{path: {folder / 'state.sqlite'}}}\n"
+            "defaults: {neighbours: true}\n"
+            f"gliders: {{{', '.join(f'{m.glider}: {{}}' for m in missions)}}}\n"
+        )
+        cost("run", "-c", config, "--replay", folder / "gliders", "--out", folder / "out")
         text = (folder / "out" / "alerts.jsonl").read_text(encoding="utf-8")
     begins = missions[0].start + job.onset * DAY
     told, kind, false = None, "", list[str]()

@@ -102,6 +102,8 @@ class Attention:
     """Hours without a dive that could be judged after which that is told; None: hours do not count."""
     unknown_dives: int | None = 8
     """Dives in a row that could not be judged after which that is told; None: their number does not count."""
+    neighbours: bool = False
+    """Whether it is compared with the gliders about it."""
 
     def is_quiet(self, now: float) -> bool:
         """Whether nothing is told of it at a time (s)."""

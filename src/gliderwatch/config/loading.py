@@ -80,6 +80,7 @@ class Config(Section):
             glider.recovered,
             settings.unknown_hours,
             settings.unknown_dives,
+            settings.neighbours,
         )
 
     def health(self, name: str) -> Mapping[str, Limits]:

@@ -189,6 +189,11 @@ class Settings(Preset):
         description="Dives in a row without a judgement after which a message comes; null: their number "
         "does not count.",
     )
+    neighbours: bool = Field(
+        default=_A.neighbours,
+        description="Compare its currents with those of the gliders within 60 km, and report what does not "
+        "fit. Off by default: at fronts healthy gliders got such messages (docs/fleet.md).",
+    )
 
     preset: str | None = Field(default=None, description="Name of a preset; keys given here win over it.")
     rules: Rules = Field(default=Rules(), description="When to alert.")

@@ -263,14 +263,16 @@ def _speak_of_calls(
 
 
 def _compare(
-    store: Store, said: NotificationState, last: Assessment | None, params: GliderParams
+    store: Store, said: NotificationState, last: Assessment | None, params: GliderParams, wanted: bool
 ) -> tuple[NotificationState, list[Notice]]:
-    """What is to be said of a glider beside its neighbours: once for each surfacing, by what was measured
-    until then. Only a glider that is compared with its own currents (`reference: dac`) has them in its
+    """What is to be said of a glider beside its neighbours, where that is wanted: once for each surfacing,
+    by what was measured until then. Only a glider that is compared with its own currents (`reference: dac`) has them in its
     assessments.
     """
     before = said.neighbours
-    if last is None or params.reference != "dac" or (before is not None and before.checked >= last.t_surface):
+    if not wanted or last is None or params.reference != "dac":
+        return said, []
+    if before is not None and before.checked >= last.t_surface:
         return said, []
     currents = list[DiveCurrent]()
     for glider in store.gliders():
@@ -312,7 +314,7 @@ def _due_messages(
     blind, of_watch = unjudged.announce(said.unknown, known, attention, params.rules.reminder_hours, now)
     ids, of_files = irregularities.due(before.irregularities, known.irregularities(now), now)
     said = replace(said, unknown=blind, irregularities=ids)
-    said, of_fleet = _compare(store, said, last, params)
+    said, of_fleet = _compare(store, said, last, params, attention.neighbours)
     acks, reminder_hours = store.notes.acks(glider), params.rules.reminder_hours
     said, of_calls = _speak_of_calls(said, known, acks, reminder_hours, now)
     rows, fix = store.health.judged(glider), known.last_fix(now - GONE)
