@@ -266,8 +266,8 @@ def _compare(
     store: Store, said: NotificationState, last: Assessment | None, params: GliderParams, wanted: bool
 ) -> tuple[NotificationState, list[Notice]]:
     """What is to be said of a glider beside its neighbours, where that is wanted: once for each surfacing,
-    by what was measured until then. Only a glider that is compared with its own currents (`reference: dac`) has them in its
-    assessments.
+    by what was measured until then. Only a glider that is compared with its own currents (`reference: dac`)
+    has them in its assessments.
     """
     before = said.neighbours
     if not wanted or last is None or params.reference != "dac":
