@@ -178,8 +178,9 @@ def _of_disagreement(a: Assessment) -> Likely:
     cause = _SURE_REASONS.get(a.reason)
     if cause is None and side is not None and sigma is not None and abs(side) > 3 * sigma:
         return Likely(COMPASS, f"it makes {100 * abs(side):.0f} % of its speed across its heading")
-    fact = "" if across is None else f"the track misses by {speed(abs(across))} across the heading"
-    return Likely(cause or FLOW, fact)
+    if across is not None and cause is not DRIVEN:
+        return Likely(cause or FLOW, f"the track misses by {speed(abs(across))} across the heading")
+    return Likely(cause or FLOW, "")
 
 
 def _of_rates(off: dict[str, BaselineRemark]) -> Likely | None:

@@ -8,7 +8,7 @@ from statistics import NormalDist
 from typing import NamedTuple
 
 from gliderwatch.messages.baseline import has_usual, usual
-from gliderwatch.messages.causes import ROLL_OF_ANY, Cause
+from gliderwatch.messages.causes import ROLL_OF_ANY, WING, Cause
 from gliderwatch.messages.formatting import angle, clean, known, speed
 from gliderwatch.model import Assessment, Kind
 
@@ -96,8 +96,8 @@ def _of_speed(a: Assessment) -> float | None:
 
 def _of_misfit(a: Assessment) -> float | None:
     across, sigma = number(a, "across_misfit"), number(a, "across_sigma")
-    if across is None or not sigma:
-        return None
+    if across is None or not sigma or abs(across) <= misfit_limit(a):
+        return _of_speed(a) if out_of_range(a, a.speed) else None
     return 2 * NormalDist().cdf(abs(across) / sigma) - 1
 
 
@@ -108,7 +108,9 @@ def _of_misfit(a: Assessment) -> float | None:
 def weigh(a: Assessment, kind: Kind, cause: Cause) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """What speaks for and against a cause, three lines each at most, the most telling first."""
     found = (
-        _disagreement(a) if kind is Kind.FALSE_ALARM else [*_speeds(a), *_fits(a, cause), *_of_any(a, cause)]
+        _disagreement(a)
+        if kind is Kind.FALSE_ALARM
+        else [*_speeds(a, cause), *_fits(a, cause), *_of_any(a, cause)]
     )
     found.sort(key=lambda remark: -remark.weight)
     pro = tuple(dict.fromkeys(r.text for r in found if r.is_for))
@@ -129,11 +131,11 @@ def _fits(a: Assessment, cause: Cause) -> list[Remark]:
     return found
 
 
-def _speeds(a: Assessment) -> list[Remark]:
+def _speeds(a: Assessment, cause: Cause) -> list[Remark]:
     """What else tells the speed, against the same range."""
     across = number(a, "across_misfit")
     rows = []
-    if across is None or abs(across) <= _limit(a):
+    if across is None or abs(across) <= misfit_limit(a):
         rows.append(("along_speed", "ground velocity less current gives {} along the heading"))
     rows.append(("onboard_speed", "the glider itself reports {}"))
     found = []
@@ -142,8 +144,9 @@ def _speeds(a: Assessment) -> list[Remark]:
         if value is not None:
             is_out = out_of_range(a, value)
             text = f"{words.format(speed(value))}, {'out of' if is_out else 'within'} the normal range"
-            # what a glider reports of itself does not know of a lost wing: it is good to know
-            found.append(Remark(is_out, text, STRONG if name == "along_speed" else 1.0))
+            # what a glider reports of itself does not know of a lost wing
+            is_for = is_out != (cause is WING and name == "onboard_speed")
+            found.append(Remark(is_for, text, STRONG if name == "along_speed" else 1.0))
     before, now = number(a, "speed_before"), known(a.speed)
     if before is not None and out_of_range(a, now) and out_of_range(a, before):
         found.append(Remark(True, f"the dive before was out of range too: {speed(before)}"))
@@ -169,7 +172,7 @@ def _disagreement(a: Assessment) -> list[Remark]:
     """For and against that a measurement is wrong."""
     found = []
     across, apart, p_e = number(a, "across_misfit"), difference(a), known(a.p_e)
-    if across is not None and abs(across) > _limit(a):
+    if across is not None and abs(across) > misfit_limit(a):
         text = (
             f"across the heading the track misses by {speed(abs(across))}, which a slow glider cannot cause"
         )
@@ -190,7 +193,7 @@ def _disagreement(a: Assessment) -> list[Remark]:
     return found
 
 
-def _limit(a: Assessment) -> float:
+def misfit_limit(a: Assessment) -> float:
     """The misfit (m/s) that chance does not explain."""
     return max(MISFIT, SURE * (number(a, "across_sigma") or 0.0))
 

@@ -241,12 +241,14 @@ def _title(glider: str, incident: Incident, dive: Assessment, likely: Likely) ->
     cause = f": {short}" if short else ""
     if incident.kind is Kind.FALSE_ALARM:
         return titled(glider, word, cause)
+    if known(dive.speed) is None:
+        return titled(glider, f"{word}, speed not known", f" ({normal_range(dive)})", cause)
     return titled(glider, f"{word} {exact_speed(dive)}", f" ({normal_range(dive)})", cause)
 
 
 def _headline(incident: Incident, a: Assessment, likely: Likely) -> str:
     """What is wrong since when, how badly, how sure, and the likeliest cause with what points to it."""
-    fact = f" ({likely.fact})" if likely.fact else ""
+    fact = f": {likely.fact}" if likely.fact else ""
     sure = certainty(incident.kind, a, incident.dives)
     since = f"since {utc(incident.since)} ({_dives(incident)})"
     if incident.kind is Kind.FALSE_ALARM:

@@ -127,10 +127,15 @@ def titled(glider: str, what: str, *more: str) -> str:
 _TODO = "What to do: "
 
 
+def sentence(text: str) -> str:
+    """Words with a capital at their beginning."""
+    return text[:1].upper() + text[1:]
+
+
 def told_and_todo(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Paragraphs, one a line, and of those that begin so what to do, each made one printable line."""
     lines = [line for line in (clean(raw, 500) for raw in text.splitlines()) if line]
-    todo = tuple(line.removeprefix(_TODO) for line in lines if line.startswith(_TODO))
+    todo = tuple(sentence(line.removeprefix(_TODO)) for line in lines if line.startswith(_TODO))
     return tuple(line for line in lines if not line.startswith(_TODO)), todo
 
 

@@ -7,7 +7,7 @@ from collections import defaultdict
 from gliderwatch.incidents.notices import Blind, JudgedAgain, Unjudged
 from gliderwatch.messages.formatting import clean, duration, utc
 from gliderwatch.messages.lines import name_of, next_call, silence, where
-from gliderwatch.messages.template import Page, Text, titled
+from gliderwatch.messages.template import Page, Text, sentence, titled
 from gliderwatch.model import Hindrance, Unusable
 
 _SHOWN = 4
@@ -108,4 +108,4 @@ def _counted(item: Unjudged, count: int) -> str:
 
 
 def _cure(item: Unjudged) -> str:
-    return CURES[item.cause].format(cache=f"{clean(item.crc, 40)}.cac")
+    return sentence(CURES[item.cause].format(cache=f"{clean(item.crc, 40)}.cac")) + "."
