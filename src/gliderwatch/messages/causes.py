@@ -172,6 +172,11 @@ _SURE_REASONS: dict[str, Cause] = {
 """The cause that the estimator names itself."""
 
 
+def is_named(reason: str) -> bool:
+    """Whether the words of the estimator are those of a cause, so that they need not be repeated."""
+    return reason in _SURE_REASONS
+
+
 def _of_disagreement(a: Assessment) -> Likely:
     across = known(a.evidence.get("across_misfit"))
     side, sigma = known(a.evidence.get("side")), known(a.evidence.get("side_sigma"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from gliderwatch.incidents.notices import Situation
+from gliderwatch.messages.causes import is_named
 from gliderwatch.messages.evidence import normal_range, number, out_of_range
 from gliderwatch.messages.formatting import (
     UNKNOWN,
@@ -106,5 +107,5 @@ def dive_numbers(a: Assessment, situation: Situation) -> Pairs:
         ("Dive", f"{utc(a.t_dive)} to {utc(a.t_surface)}, segment {clean(a.segment, 60)}"),
         ("Current, estimated", flow(a.flow_u, a.flow_v)),
         ("Current as the glider reckons it", reference),
-        *((("Why it is flagged", reason),) if reason and a.flag else ()),
+        *((("Why it is flagged", reason),) if reason and a.flag and not is_named(a.reason) else ()),
     )
