@@ -49,7 +49,7 @@ test-all: $(VENV)/installed ## the same, and those marked `slow`: the long versi
 
 define PYTEST
 @mkdir -p build; rm -f build/tests-*.xml; failed=0; \
-$(BIN)/python -m pytest -m "timing $(SLOW)" --junit-xml=build/tests-timing.xml || [ $$? -eq 5 ] || failed=1; \
+$(BIN)/python -m pytest -m "timing $(SLOW)" $$(grep -rl "mark[.]timing" tests --include="*.py") --junit-xml=build/tests-timing.xml || [ $$? -eq 5 ] || failed=1; \
 $(BIN)/python -m pytest -m "not timing $(SLOW)" -n $(JOBS) --dist worksteal --junit-xml=build/tests-main.xml || failed=1; \
 exit $$failed
 endef
@@ -101,9 +101,10 @@ wheelhouse: $(VENV)/installed sbom ## everything a machine without internet need
 lock: ## choose the newest packages anew and write both lock files
 	$(PYTHON) -m venv build/uv
 	build/uv/bin/python -m pip install --quiet uv==$(UV_VERSION)
-	build/uv/bin/uv pip compile $(UV_FLAGS) pyproject.toml -o requirements.lock
-	build/uv/bin/uv pip compile $(UV_FLAGS) -c requirements.lock --group dev pyproject.toml -o requirements-dev.lock
+	build/uv/bin/uv pip compile $(UV_FLAGS) $(EXTRAS) pyproject.toml -o requirements.lock
+	build/uv/bin/uv pip compile $(UV_FLAGS) $(EXTRAS) -c requirements.lock --group dev pyproject.toml -o requirements-dev.lock
 
+EXTRAS = --extra ais --extra web
 UV_FLAGS = --no-config --quiet --upgrade --universal --python-version 3.11 --only-binary :all: \
 	--generate-hashes --custom-compile-command "make lock"
 

@@ -23,8 +23,9 @@ from gliderwatch.estimation.dive_measurement import observe
 from gliderwatch.model import Array, Dive, readonly
 from gliderwatch.papers import two_stage
 from gliderwatch.papers.two_stage import TwoStageParams
-from gliderwatch.sea import flow_forecast
+from gliderwatch.sea import flow_forecast, gauss_markov
 from gliderwatch.sea.flow_forecast import Currents, Parameters, forecasts, learn, predict
+from gliderwatch.sea.gauss_markov import FlowParams
 from gliderwatch.sea.tides import Constituent
 from gliderwatch.simulate import ocean
 from gliderwatch.simulate.delivery import write_mission
@@ -57,18 +58,20 @@ FIXED = Parameters(
 )
 INSIDE = 5.991
 """95 % of chi-square with 2 degrees of freedom."""
-NAMES = ("persistence", "two-stage", "two-stage 119 h", "fixed", "residual", "tides", "chosen")
+NAMES = ("persistence", "two-stage", "two-stage 119 h", "fixed", "one sea", "residual", "tides", "chosen")
 
 
 @dataclass(frozen=True)
 class Seen:
-    """A dive's interval (s), its believed current (m/s) with error, and the true one where it is known."""
+    """A dive's interval (s), its believed current (m/s) with error, the true one where it is known, and its
+    latitude (degrees)."""
 
     start: float
     end: float
     current: Array
     sigma: float
     truth: Array | None
+    lat: float
 
 
 @dataclass(frozen=True)
@@ -93,7 +96,7 @@ def seen(dives: Sequence[Dive], truth: dict[float, Array] | None = None) -> list
         assert each.current is not None
         known = truth.get(dive.t_dive) if truth is not None else None
         if truth is None or known is not None:
-            out.append(Seen(each.start, each.end, each.current, each.current_sigma, known))
+            out.append(Seen(each.start, each.end, each.current, each.current_sigma, known, dive.end.lat))
     return out
 
 
@@ -140,12 +143,32 @@ class Fixed:
         return told.mean[0]
 
 
+class OneSea:
+    """The model of the sea of the joint estimator (`sea.gauss_markov`), learnt from the currents alone."""
+
+    def __init__(self) -> None:
+        self.t, self.params = -np.inf, FlowParams()
+        self.x, self.cov = np.zeros(self.params.size), np.diag(gauss_markov.prior(self.params))
+
+    def __call__(self, each: Seen) -> Array:
+        q, gap = gauss_markov.intensities(self.x, 1.0, self.params), max(each.start - self.t, 0.0)
+        gap = gap if np.isfinite(gap) else 0.0
+        step = gauss_markov.passage(gap, each.end - each.start, each.lat, q, self.params)
+        x, cov = step.matrix @ self.x, step.matrix @ self.cov @ step.matrix.T + step.noise
+        mean = self.params.mean
+        gain = cov[:, mean] @ np.linalg.inv(cov[mean, mean] + each.sigma**2 * np.eye(2))
+        self.x, self.cov = x + gain @ (each.current - x[mean]), cov - gain @ cov[mean]
+        self.t = each.end
+        return np.asarray(x[mean])
+
+
 def rows(dives: Sequence[Seen]) -> tuple[list[Row], float]:
     """What was foretold of each dive, and how long it took to learn a dive (s)."""
     others: dict[str, Callable[[Seen], Array | None]] = {
         "two-stage": TwoStage(TwoStageParams(constituents=M2_K1)),
         "two-stage 119 h": TwoStage(TwoStageParams(cutoff=1 / (119.4 * HOUR), constituents=M2_K1)),
         "fixed": Fixed(),
+        "one sea": OneSea(),
     }
     state, out, cost = Currents(), [], 0.0
     for each in dives:
@@ -213,8 +236,8 @@ def main() -> None:
         "many are in the 95 % ellipse of the chosen forecast; error of the displacement in 3 h (m) of\n"
         "persistence and chosen, against the true current where it is known, and how many are in its 95 %\n"
         "ellipse; time to learn a dive (ms)\n"
-        f"{'':22s} dives   last   2-st  2-119  fixed resid.  tides chosen    on  inside   last chosen inside"
-        "    ms"
+        f"{'':22s} dives   last   2-st  2-119  fixed    one resid.  tides chosen    on  inside   last "
+        "chosen inside    ms"
     )
     every: list[Row] = []
     if arguments.missions.is_dir():

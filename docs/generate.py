@@ -51,8 +51,8 @@ A channel's URL, or any part of it, can come from elsewhere:
 
 | written | comes from |
 | --- | --- |
-| `${NAME}` | environment variable |
-| `${file:PATH}` | text of a file, one line |
+| `${NAME}` | environment variable, for the service a line `NAME=...` in `/etc/default/gliderwatch` |
+| `${file:PATH}` | a file with one line that the service may read |
 | `${credential:NAME}` | systemd credential (`LoadCredential=NAME:PATH` of the service) |
 | `url: {file: PATH}` | a file with the complete URL |
 
@@ -119,10 +119,11 @@ def configuration() -> str:
 
 
 def _sections(root: Schema, node: Schema, path: str) -> Iterator[tuple[str, Schema]]:
-    """Path and schema of each section below `node`, depth first; a glider's are as the defaults'."""
-    if path == "gliders.NAME":
-        return
+    """Path and schema of each section below `node`, depth first; what a glider shares is the defaults'."""
+    shared = root["$defs"]["Settings"]["properties"] if path == "gliders.NAME" else {}
     for key, value in node["properties"].items():
+        if key in shared:
+            continue
         named = next(iter(value.get("patternProperties", {}).values()), {})
         ref = _ref(value) or named.get("$ref")
         if ref:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from alert_support import DISAGREE, DIVE, HEALTHY, SLOW, SURFACE, incident
 from gliderwatch.estimation.modes import MODES
 from gliderwatch.estimation.verdict import FASTER, Blame
+from gliderwatch.fleet.cross_check import Fault, Hypothesis
 from gliderwatch.incidents.notices import (
     Aborted,
     AbortReport,
@@ -20,6 +21,7 @@ from gliderwatch.incidents.notices import (
     Cleared,
     Content,
     Corrected,
+    DiffersFromNeighbours,
     DriftEllipse,
     Fleet,
     Irregularity,
@@ -196,6 +198,18 @@ def kinds() -> dict[str, Alert]:
         "resumed": message(Kind.ALL_CLEAR, Resumed(CALL), info),
         "call": message(Kind.CALL, CalledWithoutFile((CUT, CUT)), warning),
         "sends-again": message(Kind.ALL_CLEAR, SendsAgain(CALL), info),
+        "neighbours": message(
+            Kind.NEIGHBOURS,
+            DiffersFromNeighbours(
+                Hypothesis("electa", Fault.LOSS, DIVE, 6, 0.41, 0.06, 43.0), ("angus", "bruce"), 8e3
+            ),
+        ),
+        "neighbours-all": message(
+            Kind.NEIGHBOURS,
+            DiffersFromNeighbours(
+                Hypothesis("", Fault.TURN, DIVE, 6, 0.2, 0.03, 30.0), ("angus", "bruce"), 8e3
+            ),
+        ),
         "operator-files": message(
             Kind.OPERATOR,
             Irregularity(

@@ -369,6 +369,7 @@ class Kind(StrEnum):
     ACKNOWLEDGED = "acknowledged"
     ABORT = "abort"
     CALL = "call"
+    NEIGHBOURS = "neighbours"
     OPERATOR = "operator"
 
 

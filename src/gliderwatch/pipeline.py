@@ -37,7 +37,7 @@ class Memory:
     where and when it comes up next (None: cannot be said yet)."""
 
     estimate: Estimate = Estimate()
-    watches: RuleStates = RuleStates()
+    rules: RuleStates = RuleStates()
     surfacings: Surfacings = Surfacings()
     expected: NextSurfacing | None = None
 
@@ -46,16 +46,16 @@ class Memory:
 class GliderState:
     """All that is known of one glider after a segment: the checkpoint.
 
-    ``settled`` is the memory after all dives but the last one, ``last`` that dive, ``assessment`` and
-    ``told`` what was said of it, ``memory`` the memory after it. When the current of the last dive is
-    corrected, that dive is taken again from ``settled``.
+    ``settled`` is the memory after all dives but the last one, ``last`` that dive, ``assessment`` its
+    assessment and ``changed`` the incidents that it changed, ``memory`` the memory after it. When the current
+    of the last dive is corrected, that dive is assessed again from ``settled``.
     """
 
     navigation: Navigation = Navigation()
     settled: Memory = Memory()
     last: Dive | None = None
     assessment: Assessment | None = None
-    told: tuple[Incident, ...] = ()
+    changed: tuple[Incident, ...] = ()
     memory: Memory = Memory()
     waypoints: WaypointLog = ()
 
@@ -92,11 +92,11 @@ def process(
     key = digest(params)
     settled, last, assessment, memory = state.settled, state.last, state.assessment, state.memory
     assessments = {assessment.t_dive: assessment} if assessment is not None else {}
-    incidents = {i.id: i for i in settled.watches.open()}
+    incidents = {i.id: i for i in settled.rules.open()}
     waypoints = read_waypoints(state.waypoints, segment)
-    changed = {i.id: i for i in state.told}
+    changed = {i.id: i for i in state.changed}
     for dive in dives:
-        if dive.end is None:  # not surfaced yet: worth telling, not worth learning from
+        if dive.end is None:  # not surfaced yet: assessed, not learnt from
             assessments[dive.t_dive] = step(memory.estimate, dive, params, key)[1]
             continue
         if last is None or dive.t_dive != last.t_dive:
@@ -104,8 +104,8 @@ def process(
             settled = memory
         last = dive
         waypoint = active_waypoint(waypoints, dive.end.t)
-        memory, assessment, told = _after(settled, dive, waypoint, params, key, ocean)
-        changed = {i.id: i for i in told}
+        memory, assessment, opened = _after(settled, dive, waypoint, params, key, ocean)
+        changed = {i.id: i for i in opened}
         assessments[dive.t_dive] = assessment
     since = state.last.t_dive if state.last is not None else float("-inf")
     return Outcome(
@@ -127,14 +127,14 @@ def _after(
 ) -> tuple[Memory, Assessment, tuple[Incident, ...]]:
     """The memory after one more dive that ended, what is said of the dive, and the incidents it changed."""
     over: tuple[Incident, ...] = ()
-    last = before.surfacings.fix
-    if last is not None and dive.start is not None and are_apart(last, dive.start):
-        # another deployment: what was open on the last one is over
-        over, before = end_all(before.watches, dive.t_dive), Memory()
-    frozen = bool(before.watches.open())
+    last, begun = before.surfacings.fix, dive.start or dive.end
+    if last is not None and begun is not None and are_apart(last, begun):
+        # another deployment, another sea and perhaps another trim: what was open on the last one is over
+        over, before = end_all(before.rules, dive.t_dive), Memory()
+    frozen = bool(before.rules.open())
     estimate, assessment = step(before.estimate, dive, params, key, frozen, ocean)
-    watches, told = advance(before.watches, assessment, params.rules)
+    rules, changed = advance(before.rules, assessment, params.rules)
     surfacings = learn(before.surfacings, dive, waypoint, before.expected)
     outlook = look_ahead(estimate, ground(dive))
     expected = None if outlook is None else expect(surfacings, *outlook, params.surfacing_hours)
-    return Memory(estimate, watches, surfacings, expected), assessment, over + told
+    return Memory(estimate, rules, surfacings, expected), assessment, over + changed

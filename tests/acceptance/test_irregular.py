@@ -36,6 +36,7 @@ def test_names_that_are_used_twice_are_two_segments(tmp_path: Path) -> None:
     assert f"files: {len(case.files)} taken" in found.replayed
 
 
+@pytest.mark.slow
 def test_two_gliders_of_one_name_are_told(tmp_path: Path) -> None:
     found = said(two_gliders(), tmp_path)
     title = f"files of two gliders come under the name {GLIDER}"

@@ -104,13 +104,13 @@ def test_wheel_carries_presets_licence_and_command(tmp_path: Path) -> None:
 # --------------------------------------------------------------------------- service
 
 
-@pytest.fixture
-def unit(tmp_path: Path) -> Path:
-    """The service with its command and its user replaced by ones that exist on this machine."""
+@pytest.fixture(params=["gliderwatch.service", "gliderwatch-web.service"])
+def unit(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
+    """A service with its command and its user replaced by ones that exist on this machine."""
     if not shutil.which("systemd-analyze"):
         pytest.skip("systemd-analyze is not installed")
-    text = (ROOT / "systemd" / "gliderwatch.service").read_text(encoding="utf-8")
-    path = tmp_path / "gliderwatch.service"
+    text = (ROOT / "systemd" / request.param).read_text(encoding="utf-8")
+    path = tmp_path / request.param
     path.write_text(text.replace("/opt/gliderwatch/bin/gliderwatch", "/bin/true"), encoding="utf-8")
     return path
 

@@ -150,6 +150,7 @@ def test_damage_found_while_it_runs_ends_it_in_words_and_the_next_start_makes_it
     assert results(site.state) == results(out / "replay.sqlite")
 
 
+@pytest.mark.slow
 def test_a_record_of_a_type_that_is_not_known_is_no_damage_and_sets_nothing_aside(site: Site) -> None:
     """A mistake of a release: the file stays, the service says so, and the release that wrote it goes on."""
     early, late = FILES[:4], FILES[4:]

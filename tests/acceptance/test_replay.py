@@ -6,6 +6,8 @@ import os
 import pty
 import re
 import subprocess
+import threading
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -218,14 +220,24 @@ def test_bad_files_do_not_stop_the_others(mission: Path, tmp_path: Path) -> None
     assert "utf8.sbd: its name is not UTF-8" in result.stdout
 
 
+def drained(terminal: int) -> None:
+    """Read until the other end is closed."""
+    with suppress(OSError):
+        while os.read(terminal, 65536):
+            pass
+
+
 def test_what_is_piped_holds_the_alerts_also_while_a_bar_is_on_the_terminal(mission: Path) -> None:
     main, terminal = pty.openpty()
+    reader = threading.Thread(target=drained, args=(main,))  # a terminal that nobody reads gets full
+    reader.start()
     try:
         result = subprocess.run(
             [GLIDERWATCH, "run", "--replay", mission], stdout=subprocess.PIPE, stderr=terminal, check=True
         )
     finally:
         os.close(terminal)
+        reader.join()
         os.close(main)
     assert b"ANOMALY bruce" in result.stdout
 

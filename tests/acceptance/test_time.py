@@ -125,6 +125,7 @@ def test_a_clock_that_jumps_both_ways_changes_nothing(site: Site) -> None:
     assert results(site.state) == results(site.config.with_name("out") / "replay.sqlite")
 
 
+@pytest.mark.slow
 def test_a_message_put_off_before_the_clock_is_set_back_is_not_put_off_for_a_year(site: Site) -> None:
     clock = site.config.with_name("clock")
     clock.write_text(str(365 * DAY), encoding="utf-8")

@@ -7,6 +7,7 @@ program itself, as `support.Daemon` does; `test_commands` compares the two.
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import sys
@@ -41,7 +42,13 @@ def _main(arguments: Sequence[str], env: Mapping[str, str], cwd: Path, outputs: 
     sys.argv = list(arguments)
     from gliderwatch.cli.main import main
 
-    main()
+    code: object = None
+    try:
+        main()
+    except SystemExit as end:
+        code = end.code
+    gc.collect()  # as when Python ends: what was left open is closed
+    sys.exit(code)
 
 
 def run(arguments: Sequence[str], env: Mapping[str, str], cwd: Path, timeout: float) -> CompletedProcess[str]:

@@ -3,6 +3,7 @@
 import random
 import sqlite3
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 
 import pytest
@@ -33,20 +34,34 @@ def live(segments, delays=None, store=None, start=0):
 
 
 MISSION = mission(LEGS)
+
+
+@cache
+def right():
+    """What comes of the mission with a clock that is right."""
+    return feed(MISSION)
+
+
+@cache
+def fallen(step):
+    """The same with a clock that is set by `step` (s) before the 16th segment."""
+    return feed(with_clock_set(MISSION, 15, step))
+
+
 CAME = [s.last_t + 600.0 for s in MISSION]
 
 
 @pytest.mark.parametrize("step", [-1 * HOUR, -2 * HOUR, -5 * HOUR, -10 * DAY, -WEEKS, -9500.0])
 class TestSetBack:
     def test_no_dive_is_flagged_or_lost(self, step):
-        dives = feed(with_clock_set(MISSION, 15, step)).assessments("unit")
+        dives = fallen(step).assessments("unit")
         assert [a.flag for a in dives] == [0] * len(MISSION)
         assert [a.t_dive for a in dives] == sorted(a.t_dive for a in dives)
 
     def test_its_dives_are_where_they_were_and_a_note_says_why(self, step):
-        dives = feed(with_clock_set(MISSION, 15, step)).assessments("unit")
-        right = feed(MISSION).assessments("unit")
-        off = [abs(a.t_dive - b.t_dive) for a, b in zip(dives, right, strict=True)]
+        dives = fallen(step).assessments("unit")
+        pairs = zip(dives, right().assessments("unit"), strict=True)
+        off = [abs(a.t_dive - b.t_dive) for a, b in pairs]
         assert max(off) < 900.0 and max(off[:15]) == 0.0
         assert all(any("behind" in note for note in a.notes) for a in dives[15:])
         assert not any("behind" in note for a in dives[:15] for note in a.notes)
@@ -54,7 +69,7 @@ class TestSetBack:
     def test_any_order_of_arrival_ends_alike(self, step):
         segments = with_clock_set(MISSION, 15, step)
         order = random.Random(5).sample(segments, len(segments))
-        assert ending(feed(order), "unit") == ending(feed(segments), "unit")
+        assert ending(feed(order), "unit") == ending(fallen(step), "unit")
 
     def test_it_is_not_overdue_while_it_calls(self, step):
         store, alerts = live(with_clock_set(MISSION, 15, step), CAME)
@@ -69,7 +84,7 @@ def test_a_clock_set_forward_by_hours_costs_no_dive(step):
     assert [a.flag for a in dives] == [0] * len(MISSION)
     (noted,) = (a for a in dives if any("clock was set forward" in note for note in a.notes))
     assert noted.t_dive == dives[15].t_dive
-    assert [a.t_dive for a in dives[15:]] == [a.t_dive + step for a in feed(MISSION).assessments("unit")[15:]]
+    assert [a.t_dive for a in dives[15:]] == [a.t_dive + step for a in right().assessments("unit")[15:]]
 
 
 @pytest.mark.parametrize(

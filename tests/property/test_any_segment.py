@@ -74,7 +74,7 @@ PARAMS = [
 ]
 
 
-@settings(max_examples=250, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=80, suppress_health_check=[HealthCheck.too_slow])
 @given(segments(), st.sampled_from(PARAMS))
 def test_any_numbers(made, params):
     store = feed(made, params, SPEAKING)

@@ -39,7 +39,7 @@ VALUES = st.recursive(
     ),
     max_leaves=12,
 )
-SLOW_IS_FINE = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+SLOW_IS_FINE = settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 
 def loads_or_says_why(data: bytes) -> None:

@@ -74,9 +74,9 @@ def turned(all_dives: list[Dive], angle: float) -> list[Dive]:
 @given(dives())
 def test_all_numbers_are_finite_and_covariances_are_ones(all_dives):
     state, verdicts = run(all_dives)
-    assert np.isfinite(state.joint.x).all()
-    assert np.array_equal(state.joint.cov, state.joint.cov.T)
-    assert np.linalg.eigvalsh(state.joint.cov).min() > -1e-12
+    assert np.isfinite(state.filter.x).all()
+    assert np.array_equal(state.filter.cov, state.filter.cov.T)
+    assert np.linalg.eigvalsh(state.filter.cov).min() > -1e-12
     for verdict in verdicts:
         found = verdict.info.estimate
         assert math.isfinite(found.speed)

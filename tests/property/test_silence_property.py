@@ -17,7 +17,7 @@ def surfacings(hours: list[float]) -> list[float]:
     return times
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(gaps, st.sampled_from([None, 0.25, 2.0]))
 def test_a_clock_that_ticks_says_what_a_replay_says(hours, margin):
     """To the letter: ticks every few minutes on one side, whenever something is due on the other."""
@@ -39,7 +39,7 @@ def test_a_clock_that_ticks_says_what_a_replay_says(hours, margin):
     assert live.silences == replay.silences
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(gaps, st.data())
 def test_files_in_any_order_at_any_time(hours, data):
     """Ids are unique; a silence ends once; in the end, every one told that never was is withdrawn."""

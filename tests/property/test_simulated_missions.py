@@ -137,7 +137,7 @@ def decoded(paths: Sequence[Path], cache: Path) -> dict[str, Segment]:
 
 
 @settings(
-    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
+    max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
 )
 @given(scenarios(), st.booleans(), st.sampled_from(list(Generation)))
 def test_any_scenario_is_read_back(scenario: Scenario, compressed: bool, generation: Generation) -> None:
@@ -156,7 +156,7 @@ def test_any_scenario_is_read_back(scenario: Scenario, compressed: bool, generat
         check(segment, read[f"{segment.header.full_name}.{suffix}"])
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(scenarios())
 def test_the_same_scenario_is_the_same_mission(scenario: Scenario) -> None:
     one, two = simulate(replace(scenario, days=0.1)), simulate(replace(scenario, days=0.1))

@@ -11,8 +11,10 @@ import msgspec
 import pytest
 
 from gliderwatch.errors import LayoutError, StateError
+from gliderwatch.estimation import healthy_baseline
 from gliderwatch.incidents.acknowledgement import Ack
 from gliderwatch.incidents.notifications import NotificationState
+from gliderwatch.layers.advice import Layered
 from gliderwatch.model import Alert, Assessment, Incident, Kind, NextSurfacing, Segment
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, process
@@ -30,6 +32,7 @@ ROWS = {
     NotificationState: "said",
     Ack: "acks",
     Alert: "alerts",
+    Layered: "layers",
 }
 
 
@@ -133,6 +136,18 @@ def renamed(state):
 def flattened(state):
     moved(state, "memory.estimate", "estimate")
     return state
+
+
+def test_columns_of_the_healthy_dives_are_those_that_are_kept():
+    """No type shows how wide the array is: with another column no kept state could be continued.
+
+    A new number needs a converter too (CONTRIBUTING.md, "a change of the state"), and then a line here.
+    """
+    assert list(healthy_baseline._COLUMN) == [
+        *("roll_mean", "pitch_dive", "pitch_climb", "pitch_asymmetry", "depth_rate_dive", "depth_rate_climb"),
+        *("rate_ratio", "ballast_dive", "ballast_climb", "yos_per_hour", "duration_h", "vacuum"),
+        *("depth_max", "thruster"),
+    ]
 
 
 def test_records_of_each_layout_go_through_all_converters_since(monkeypatch):

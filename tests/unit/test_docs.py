@@ -16,6 +16,7 @@ from html import unescape
 from pathlib import Path
 from types import ModuleType
 
+import click
 import pytest
 from ruamel.yaml import YAML
 
@@ -102,6 +103,8 @@ def test_commands_and_their_options_exist(page: Path) -> None:
         if not words:
             continue
         command = main.commands[words[1]]
+        if isinstance(command, click.Group):
+            command = command.commands[words[2]]
         known = {option for parameter in command.params for option in parameter.opts}
         assert {word for word in words[2:] if word.startswith("-")} <= known, f"{page.name}: {line}"
 
@@ -276,7 +279,11 @@ def test_layers_are_those_of_the_contract() -> None:
 
 
 def test_every_package_has_its_reason() -> None:
-    wanted = tomllib.loads(text("pyproject.toml"))["project"]["dependencies"]
+    project = tomllib.loads(text("pyproject.toml"))["project"]
+    wanted = [
+        *project["dependencies"],
+        *(p for extra in project["optional-dependencies"].values() for p in extra),
+    ]
     names = [re.split(r"[<>=\[]", package)[0] for package in wanted]
     rows = re.findall(r"^\| (\w[\w.-]*) \|", text("docs/libraries.md"), re.M)
     assert sorted(names) == sorted(rows[1:-1] if rows[-1] == "what" else rows[1:])

@@ -34,7 +34,7 @@ def drawn(dives: list[tuple[str, Fix, Fix]], seed: int) -> np.ndarray:
     """Currents ((n, 2)) of dives in a sea as the estimate takes it to be."""
     ends = [(a, b) for _, a, b in dives]
     centres = flow._centres([f for pair in ends for f in pair], ends[0][0])
-    rows, t = flow._rows(ends, ends[0][0], centres)
+    rows, t = flow._rows(ends, ends[0][0], centres, flow.USUAL)
     cov = flow._covariance(rows, t, rows, t, len(centres) + 2)
     root = np.linalg.cholesky(cov + 1e-9 * np.eye(len(cov)))
     return (root @ np.random.default_rng(seed).normal(size=len(cov))).reshape(-1, 2)

@@ -120,4 +120,4 @@ def test_a_shelf_sea_is_no_slow_glider():
         assert info.told is None
         if k > 24:
             assert info.estimate.speed == pytest.approx(0.23, abs=0.02)
-    assert state.sea < 0.5  # it was all tide
+    assert state.process_scale < 0.5  # it was all tide

@@ -48,34 +48,17 @@ def test_only_the_estimator_chosen_is_advanced():
     state = Estimate()
     for dive in STRAIGHT[:3]:
         state, _ = step(state, dive, GliderParams(), "digest")
-    assert state.learner == Estimate().learner and state.joint.speed.joint is not None
+    assert state.learner == Estimate().learner and state.speed.filter is not None
     state = Estimate()
     for dive in STRAIGHT[:3]:
         state, _ = step(state, dive, GliderParams(estimator="adaptive"), "digest")
-    assert state.joint == Estimate().joint and state.learner.learner is not None
+    assert state.speed == Estimate().speed and state.learner.learner is not None
 
 
 def test_the_uncertainty_of_the_speed_is_told():
     found = told(STRAIGHT)
     first, last = (found[k].evidence["speed_sigma"] for k in (0, -1))
     assert 0.003 < last < first < 0.1
-
-
-def test_another_deployment_begins_with_nothing():
-    moved = [replace(d, t_dive=d.t_dive + 30 * DAY, t_surface=d.t_surface + 30 * DAY) for d in STRAIGHT[:1]]
-    late = replace(
-        moved[0],
-        start=replace(moved[0].start, t=moved[0].start.t + 30 * DAY),
-        end=replace(moved[0].end, t=moved[0].end.t + 30 * DAY),
-        track=replace(moved[0].track, t=readonly(moved[0].track.t + 30 * DAY)),
-    )
-    state = Estimate()
-    for dive in STRAIGHT:
-        state, before = step(state, dive, GliderParams(), "digest")
-    assert "usual_speed" in before.evidence
-    state, after = step(state, late, GliderParams(), "digest")
-    alone = step(Estimate(), late, GliderParams(), "digest")[1]
-    assert after == alone and "usual_speed" not in after.evidence
 
 
 @pytest.mark.parametrize("estimator", ["joint", "adaptive"])

@@ -33,6 +33,7 @@ QUESTIONS = {
     "calls": (WHICH, SINCE, WHERE, TODO),
     "called": (WHICH, SINCE, TODO),
     "call": ALARM,
+    "neighbours": (WHICH, SINCE, SURE, TODO),
     "reminder": (WHICH, SINCE, WHERE, NEXT, TODO),
     "all-clear": (WHICH, SINCE, WHERE, NEXT, TODO),
     "correction": (WHICH, SINCE, WHERE, NEXT, TODO),

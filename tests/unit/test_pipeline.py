@@ -46,11 +46,11 @@ def test_what_was_open_is_over_when_another_deployment_begins():
     [opened] = {i.id for o in outcomes for i in o.incidents}
     last = [i for o in outcomes for i in o.incidents if i.id == opened][-1]
     assert last.cleared_at is not None and last.cleared_at > second[0].id.opened_at
-    assert outcomes[-1].state.memory.watches.open() == ()
+    assert outcomes[-1].state.memory.rules.open() == ()
     # what is normal is learnt anew
     state = run(second)[-1].state
-    assert outcomes[-1].state.memory.estimate.joint.speed.normal.speeds.tolist() == pytest.approx(
-        state.memory.estimate.joint.speed.normal.speeds.tolist(), abs=1e-3
+    assert outcomes[-1].state.memory.estimate.speed.normal.speeds.tolist() == pytest.approx(
+        state.memory.estimate.speed.normal.speeds.tolist(), abs=1e-3
     )
 
 

@@ -1,14 +1,12 @@
 """The measures of the score, on gliders made by hand."""
 
 import math
-import sys
 from dataclasses import replace
 
 import pytest
 
-from gliderwatch.errors import GliderwatchError
 from gliderwatch.params import RuleParams
-from gliderwatch.score import plots, summary
+from gliderwatch.score import summary
 from gliderwatch.score.accuracy import speed_scores
 from gliderwatch.score.measures import (
     MONTH,
@@ -174,9 +172,3 @@ def test_faults_are_shown_with_a_column_for_each_sea():
     cells = {str(c.header): list(c.cells) for table in by_sea for c in table.columns}
     assert cells["rotary"] == ["100% 3 h"]
     assert cells["calm"] == ["0%"]
-
-
-def test_without_the_package_that_draws_the_cure_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(GliderwatchError, match="pip install matplotlib"):
-        plots.pyplot()

@@ -113,7 +113,7 @@ def test_the_most_frequent_reason_comes_first() -> None:
         )
     body = talk.alerts[0].body
     assert "Main reason: 4 files: no cache" in body and "- 3 dives: no heading" in body
-    assert body.index("copy ab.cac from") < body.index("add m_heading")
+    assert body.index("Copy ab.cac from") < body.index("Add m_heading")
 
 
 @pytest.mark.parametrize(("dives", "hours", "n"), [(8, None, 8), (3, 24.0, 3), (None, 12.0, 4), (8, 12.0, 4)])

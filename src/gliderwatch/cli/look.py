@@ -24,6 +24,7 @@ SAMPLES = (
     "unknown",
     "abort",
     "call",
+    "neighbours",
     "all_clear",
     "reminder",
     "correction",

@@ -18,6 +18,7 @@ from gliderwatch.messages.formatting import clean, utc
 from gliderwatch.model import Assessment, Flag, Incident, Segment, SegmentId
 from gliderwatch.service import judgement, transaction
 from gliderwatch.service.backlog import Job
+from gliderwatch.service.layers import layers_of, wants_science
 from gliderwatch.service.liveness import PidLock, is_held
 from gliderwatch.service.runtime import OceanCache
 from gliderwatch.slocum import folders
@@ -213,7 +214,7 @@ def _fill(work: _Work, paths: Sequence[str], held: Sequence[SegmentId], on_step:
     steps.sort(key=_turn)
     ocean = OceanCache(work.config)
     with Decoder(caches, max_workers=2) as decoder:
-        decoder.science = bool(work.config.fields)
+        decoder.science = wants_science(work.config)
         results = decoder.map([Path(job.file.path) for _, job in steps if job is not None])
         for done, (identity, job) in enumerate(steps, 1):
             segment = _fuller(work, identity) if job is None else next(results)[1]
@@ -257,7 +258,10 @@ def _take(
     params, field_ = work.config.glider(work.glider), ocean.field(work.glider)
     try:
         with work.new.followed_by(following):
-            taken = transaction.process_file(work.new, file, segment, params, None, time.time(), ocean=field_)
+            layers = layers_of(work.config, work.glider)
+            taken = transaction.process_file(
+                work.new, file, segment, params, None, time.time(), ocean=field_, layers=layers
+            )
     except Quarantine as error:
         work.problems.append((file.path or segment.id.name, str(error)))
         return

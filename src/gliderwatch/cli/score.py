@@ -44,7 +44,6 @@ def score(out: Path, name: str, names: tuple[str, ...], missions: tuple[Path, ..
     from gliderwatch.score import grid, plots, summary, work
     from gliderwatch.score.work import version
 
-    plots.pyplot()
     chosen = list(dict.fromkeys(grid.check(e) for e in names)) or [grid.ALGORITHMS[0]]
     cells = grid.cells(grid.load_grid(name), missions)
     if not cells:

@@ -23,10 +23,12 @@ from gliderwatch.config.schema import (
     Metrics,
     Ocean,
     Operator,
+    Pages,
     Preset,
     Recipient,
     Settings,
     State,
+    Web,
 )
 from gliderwatch.errors import ConfigError
 from gliderwatch.params import Attention, GliderParams
@@ -57,6 +59,8 @@ class Config(Section):
     operator: Operator = Field(default=Operator(), description="When the operator gets a message.")
     heartbeat: Heartbeat = Field(default=Heartbeat(), description="For a dead man's switch.")
     metrics: Metrics = Field(default=Metrics(), description="For Prometheus.")
+    pages: Pages = Field(default=Pages(), description="Pages for pilots as files.")
+    web: Web = Field(default=Web(), description="The pages live.")
     _document: Document = PrivateAttr(Document(Path("configuration"), None, {}))
     _presets: Mapping[str, Preset] = PrivateAttr(default_factory=dict)
     _known: dict[str, Settings] = PrivateAttr(default_factory=dict)

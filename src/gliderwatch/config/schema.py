@@ -6,7 +6,7 @@ from ipaddress import ip_address
 from typing import Annotated, Literal
 from zoneinfo import ZoneInfo
 
-from pydantic import Field, IPvAnyAddress, model_validator
+from pydantic import AnyHttpUrl, Field, IPvAnyAddress, model_validator
 
 from gliderwatch.config.fields import (
     AbsolutePath,
@@ -212,6 +212,45 @@ class Settings(Preset):
         )
 
 
+class Layers(Section):
+    """Layers of the sea in what the glider measures, and how deep it is advised to fly to keep on them.
+
+    Nothing is ever sent to a glider."""
+
+    sensor: Literal["temperature", "salinity", "density", "oxygen"] = Field(
+        default="temperature", description="The property whose layers are followed."
+    )
+    max_depth: Annotated[Number, Field(gt=0, le=1000)] = Field(
+        description="The deepest that may be advised (m)."
+    )
+    min_depth: Annotated[Number, Field(ge=0, le=200)] = Field(
+        default=10.0, description="The shallowest that may be advised (m): the draught of ships."
+    )
+    altitude: Annotated[Number, Field(ge=0, le=200)] = Field(
+        default=10.0, description="Height above the bottom (m) that is kept."
+    )
+    method: Literal["composite", "filter"] = Field(
+        default="composite",
+        description="`composite`: the gradient of all casts together; `filter`: the filter of paper 004.",
+    )
+    full_casts: Annotated[int, Field(ge=0, le=20)] = Field(
+        default=2, description="Casts over all depths at the begin of each segment; 0: only after a reset."
+    )
+    extension: Annotated[Number, Field(gt=0, le=200)] | None = Field(
+        default=None, description="Added above and below the layer (m); null: two samples, 2 m at least."
+    )
+    outputs: AbsolutePath | None = Field(
+        default=None,
+        description="Folder for the mission arguments `yo`, for a pilot to check and send; null: none.",
+    )
+
+    @model_validator(mode="after")
+    def _has_extent(self) -> Layers:
+        if not self.min_depth < self.max_depth:
+            raise ValueError("min_depth must be above max_depth")
+        return self
+
+
 class Glider(Settings):
     """One glider; every key may be left out (`electa:` alone is enough)."""
 
@@ -226,6 +265,9 @@ class Glider(Settings):
     )
     recovered: Switch = Field(
         default=False, description="It is out of the water: no messages about it, and it is not overdue."
+    )
+    layers: Layers | None = Field(
+        default=None, description="Layers of the sea ([layers](layers.md)); null: off."
     )
 
 
@@ -414,6 +456,47 @@ class Operator(Section):
         default=500.0,
         description="Less free space than this in the folder of the state file (MB); null: never.",
     )
+
+
+class Pages(Section):
+    """Pages for pilots as files: of the fleet and of each glider, for any web server."""
+
+    folder: AbsolutePath | None = Field(
+        default=None,
+        description="The folder in which they are kept up to date; made if need be. null: none are written.",
+    )
+
+
+class Web(Section):
+    """The pages live, and links that acknowledge: the command `gliderwatch web`."""
+
+    port: Annotated[int, Field(strict=True, ge=1, le=65535)] = Field(
+        default=8463, description="TCP port that it listens on."
+    )
+    address: IPvAnyAddress = Field(
+        default=ip_address("127.0.0.1"), description="Address of this machine that the port is on."
+    )
+    open_to_network: Annotated[bool, Field(strict=True)] = Field(
+        default=False,
+        description="Whether `address` may be another than loopback. Whoever reaches the port can read where "
+        "all gliders are, without a password.",
+    )
+    public_url: AnyHttpUrl | None = Field(
+        default=None,
+        description="URL under which people reach it, through a tunnel or a reverse proxy.",
+    )
+    link_hours: Annotated[Number, Field(gt=0, le=720)] = Field(
+        default=48.0, description="Hours for which a link acknowledges."
+    )
+
+    @model_validator(mode="after")
+    def _stays_at_home(self) -> Web:
+        if not self.address.is_loopback and not self.open_to_network:
+            raise ValueError(
+                "address is not loopback: other machines could read it. Write 127.0.0.1, or add "
+                "`open_to_network: true`"
+            )
+        return self
 
 
 class Channel(Section):

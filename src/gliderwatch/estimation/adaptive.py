@@ -13,7 +13,6 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from gliderwatch.estimation.dive_measurement import are_apart
 from gliderwatch.estimation.speed_range import Normal, RangeParams, learn, setting, speed_range
 from gliderwatch.estimation.unassessed import Reference, unassessed
 from gliderwatch.model import Array, Assessment, Current, Dive, Fix, Flag, Track, readonly
@@ -142,7 +141,7 @@ def _reference(state: Learner, dive: Dive) -> tuple[Current | None, bool]:
 
 def _begin(state: Learner, dive: Dive, start: Fix, params: GliderParams) -> Learner:
     """A new estimate at the start of a deployment, else the state as it is."""
-    if state.learner is not None and state.end is not None and not are_apart(state.end, start):
+    if state.learner is not None and state.end is not None:
         return state if dive.t_dive - state.end.t < STALE else replace(state, warm=0.0)
     closed = closure(dive.track, dive.current) if dive.track and dive.current else None
     speed = closed.along_speed if closed is not None else dive.features.onboard_speed

@@ -314,7 +314,7 @@ class Measured:
 
     seen: Observation
     tells: KinematicSpeed | None
-    doubt: float
+    scale: float
     slipping: Slipping
 
     @property
@@ -374,8 +374,8 @@ def expected(x: Array, measured: Measured) -> tuple[Array, Array, Array]:
     slope[:, 4, OWN] = 1.0
     values += [flow - wrong, own[:, None]]
     noise = np.zeros((k, 5, 5))
-    noise[:, :2, :2] = measured.doubt * (seen.ground_cov + own[:, None, None] ** 2 * seen.heading_cov)
-    noise[:, 2:4, 2:4] = measured.doubt * seen.current_sigma**2 * np.eye(2)
+    noise[:, :2, :2] = measured.scale * (seen.ground_cov + own[:, None, None] ** 2 * seen.heading_cov)
+    noise[:, 2:4, 2:4] = measured.scale * seen.current_sigma**2 * np.eye(2)
     along = np.tile((own * slip_sigma)[:, None] * h, 2)
     noise[:, :4, :4] += along[:, :, None] * along[:, None, :]
     if measured.tells is not None:

@@ -9,14 +9,14 @@ import numpy as np
 
 from gliderwatch.estimation import adaptive
 from gliderwatch.estimation.adaptive import Learner
-from gliderwatch.estimation.dive_measurement import PROVISIONAL, REPORTED, are_apart
+from gliderwatch.estimation.dive_measurement import PROVISIONAL, REPORTED
 from gliderwatch.estimation.healthy_baseline import Baseline, learn, told
 from gliderwatch.estimation.kalman import JointEstimate, JointInfo, JointParams, expected_flow
 from gliderwatch.estimation.speed_range import RangeParams
 from gliderwatch.estimation.unassessed import Mean, Reference, of_learnt, of_model, of_tides, unassessed
 from gliderwatch.estimation.verdict import SpeedParams, SpeedState, Verdict
 from gliderwatch.estimation.verdict import step as step_speed
-from gliderwatch.model import Assessment, Current, Dive, Fix, Flag
+from gliderwatch.model import Assessment, Current, Dive, Flag
 from gliderwatch.papers.flags import FlowMaxima, p_e, update
 from gliderwatch.params import GliderParams
 from gliderwatch.sea import flow_forecast as currents
@@ -32,11 +32,19 @@ APART = 16.0
 
 
 @dataclass(frozen=True, slots=True)
-class Joint:
-    """State after a dive: of the estimator with its tests, and ``maxima`` of Algorithm 2."""
+class Estimate:
+    """State of the estimator of one glider after a dive.
+
+    ``speed`` (with its filter) and ``maxima`` (of Algorithm 2) of the estimator `joint`, ``learner`` of
+    `adaptive`; the one that is not chosen stays empty. ``baseline`` of what corroborates, ``currents`` of the
+    dives where the reference is their forecast.
+    """
 
     speed: SpeedState = SpeedState()
     maxima: FlowMaxima = FlowMaxima()
+    learner: Learner = Learner()
+    baseline: Baseline = Baseline()
+    currents: Currents = Currents()
 
 
 def speed_params(params: GliderParams) -> SpeedParams:
@@ -50,13 +58,13 @@ def speed_params(params: GliderParams) -> SpeedParams:
 
 
 def joint_step(
-    state: Joint,
+    state: Estimate,
     dive: Dive,
     params: GliderParams,
     digest: str,
     frozen: bool = False,
     other: Reference | None = None,
-) -> tuple[Joint, Assessment]:
+) -> tuple[Estimate, Assessment]:
     """The state after one more dive, and what it says of the dive.
 
     ``digest`` identifies the parameters; while ``frozen`` nothing is learnt of what is normal. ``other``
@@ -90,7 +98,7 @@ def joint_step(
         evidence={**plain.evidence, **_numbers(verdict, verdict.info)},
         notes=_notes(dive, current, other),
     )
-    return Joint(after, maxima), assessment
+    return replace(state, speed=after, maxima=maxima), assessment
 
 
 def _apart(found: JointEstimate, other: Reference) -> bool:
@@ -136,22 +144,6 @@ def _numbers(verdict: Verdict, info: JointInfo) -> dict[str, float]:
 # The estimator of one glider, dive by dive: the one that its settings choose, with its reference.
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    """State of the estimator of one glider after a dive.
-
-    ``joint`` of the estimator `joint`, ``learner`` of `adaptive`; the one that is not chosen
-    stays empty. ``baseline`` of what corroborates, ``currents`` of the dives where the reference is their
-    forecast; ``end``, the fix that ended the last dive.
-    """
-
-    joint: Joint = Joint()
-    learner: Learner = Learner()
-    baseline: Baseline = Baseline()
-    currents: Currents = Currents()
-    end: Fix | None = None
-
-
 def step(
     state: Estimate,
     dive: Dive,
@@ -166,19 +158,16 @@ def step(
     of what is normal; ``ocean`` is the field of a model (None: not read). A dive that cannot be used
     leaves the estimate as it is and gets an assessment with the reason.
     """
-    if dive.start is not None and state.end is not None and are_apart(state.end, dive.start):
-        state = Estimate()  # another deployment: another sea, and perhaps another trim
     other = _reference(state, dive, params, ocean)
     if params.estimator == "joint":
-        joint, assessment = joint_step(state.joint, dive, params, digest, frozen, other)
-        after = state if joint is state.joint else replace(state, joint=joint)
+        after, assessment = joint_step(state, dive, params, digest, frozen, other)
     else:
         learnt, assessment = adaptive.step(state.learner, dive, params, digest, frozen, other)
         after = state if learnt is state.learner else replace(state, learner=learnt)
     if dive.track is None or dive.start is None or dive.end is None:
         return after, assessment
     evidence = {**assessment.evidence, **told(state.baseline, dive.features)}
-    after = _with_currents(replace(after, end=dive.end), dive, params, assessment.flag)
+    after = _with_currents(after, dive, params, assessment.flag)
     if assessment.flag == Flag.NORMAL and not frozen:
         after = replace(after, baseline=learn(state.baseline, dive.features))
     return after, replace(assessment, evidence=evidence)
@@ -198,9 +187,8 @@ def _reference(state: Estimate, dive: Dive, params: GliderParams, ocean: Field |
 def _learnt(state: Estimate, dive: Dive, params: GliderParams) -> Mean | None:
     """The flow that the estimator expects on a dive."""
     assert dive.start is not None and dive.end is not None
-    joint = state.joint.speed.joint
-    if joint is not None:
-        return expected_flow(joint, FlowParams(), np.zeros(2), dive.start.t, dive.end.t)
+    if (filter_ := state.speed.filter) is not None:
+        return expected_flow(filter_, FlowParams(), np.zeros(2), dive.start.t, dive.end.t)
     flow = adaptive.learnt_flow(state.learner, dive, params)
     return None if flow is None else (flow, np.zeros((2, 2)))
 

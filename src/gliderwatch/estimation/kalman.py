@@ -18,7 +18,6 @@ from gliderwatch.estimation.dive_measurement import (
     Measured,
     Observation,
     Slipping,
-    are_apart,
     observe,
     slip_of,
 )
@@ -122,30 +121,26 @@ class JointParams:
 class JointState:
     """What is known after a dive.
 
-    ``t`` end of the last dive (s), ``x`` ((n,)) and ``cov`` ((n, n)) of the state; ``sea`` factor on the
-    variance of the flow's changes and ``doubt`` on that of the measurements, both learnt (the tests use
-    `tested`); ``dives`` used;
-    ``bank`` of the test for a step; ``nis`` and ``dof``, sums of the normalised innovations squared and
-    of their degrees of freedom on usual dives; ``end`` the fix that ended the last dive; ``wrong`` how
-    likely each of its measurements was wrong.
+    ``t`` end of the last dive (s), ``x`` ((n,)) and ``cov`` ((n, n)) of the state; ``process_scale`` factor
+    on the variance of the flow's changes and ``measurement_scale`` on that of the measurements, both learnt
+    (the tests use `tested`); ``dives`` used; ``bank`` of the test for a step; ``end`` the fix that ended the
+    last dive; ``wrong`` how likely each of its measurements was wrong.
     """
 
     t: float
     x: Array
     cov: Array
-    sea: float = 1.0
-    doubt: float = 1.0
+    process_scale: float = 1.0
+    measurement_scale: float = 1.0
     dives: int = 0
     bank: Bank = field(default_factory=Bank)
-    nis: float = 0.0
-    dof: int = 0
     end: Fix | None = None
     wrong: dict[Cause, float] = field(default_factory=dict)
 
     @property
     def tested(self) -> float:
         """The factor on the variance of the measurements with which dives are tested."""
-        return max(self.doubt, LEAST_DOUBT)
+        return max(self.measurement_scale, LEAST_DOUBT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,7 +213,7 @@ def step(
     if dive.track is None or dive.start is None or dive.end is None:
         return state, None
     seen = observe(dive)
-    if state is None or (state.end is not None and are_apart(state.end, dive.start)):
+    if state is None:
         state = init(params, seen.start)
     passage = _passage(state, seen, dive.start.lat, params)
     state = _predicted(state, seen, passage, params)
@@ -236,24 +231,21 @@ def step(
     best = max((w for w in ways if str(w.cause) == cause), key=lambda way: way.weight)
     believed = seen.own_speed()
     across = _across(state, seen, believed)
-    sea, doubt = _learnt(state, passage, best, ways, across)
+    process_scale, measurement_scale = _learnt(state, passage, best, ways, across)
     after = _mixed(state, ways, steps)
     usually = [w for w in ways if w.cause is Cause.USUAL and w.believes == best.believes]
     tested = _update(state, usually[0] if usually and best.cause is Cause.FLOW else best, steps)
     loss, turn, bank = step_test.steps(state.bank, passage_matrix(passage), tested, steps, params.front)
     # where no heading was measured, what looks like a step is a turn that was not seen
     told = None if seen.is_free else step_test.told(loss, turn, params.alarms_per_month)
-    counts = best.cause is Cause.USUAL
     after = replace(
         after,
-        sea=sea,
-        doubt=doubt,
+        process_scale=process_scale,
+        measurement_scale=measurement_scale,
         bank=bank,
         end=dive.end,
         dives=state.dives + 1,
         wrong={each: odds[str(each)] for each in Cause if each.is_error and str(each) in odds},
-        nis=state.nis + counts * best.square,
-        dof=state.dof + counts * len(best.innovation),
     )
     after = _opened(after, told)
     info = JointInfo(
@@ -275,7 +267,7 @@ def step(
 
 def _passage(state: JointState, seen: Observation, lat: float, params: JointParams) -> Passage:
     """What the time from the last dive to the end of this one makes of the flow."""
-    q = gauss_markov.intensities(state.x[: params.flow.size], state.sea, params.flow)
+    q = gauss_markov.intensities(state.x[: params.flow.size], state.process_scale, params.flow)
     return gauss_markov.passage(max(seen.start - state.t, 0.0), seen.end - seen.start, lat, q, params.flow)
 
 
@@ -309,7 +301,7 @@ def _predicted(state: JointState, seen: Observation, passage: Passage, params: J
     before = state.x[: params.flow.size]
     crossed = gauss_markov.crossing(before[0:2] + before[2:4], seen.ground, dt, params.flow)
     steps = _jump(params.flow)
-    cov = matrix @ state.cov @ matrix.T + noise + state.sea * crossed**2 * (steps @ steps.T)
+    cov = matrix @ state.cov @ matrix.T + noise + state.process_scale * crossed**2 * (steps @ steps.T)
     return replace(state, t=seen.end, x=matrix @ state.x, cov=(cov + cov.T) / 2)
 
 
@@ -382,9 +374,9 @@ def _learnt(
         share = float(np.trace(inverse)) / 2 * passage.restless
     aside = None
     if not best.cause.is_error and across is not None:
-        aside = (across[0] / across[1]) ** 2 * state.tested / state.doubt
-    return learn_process_scale(state.sea, square, share, state.dives), learn_measurement_scale(
-        state.doubt, aside, state.dives
+        aside = (across[0] / across[1]) ** 2 * state.tested / state.measurement_scale
+    return learn_process_scale(state.process_scale, square, share, state.dives), learn_measurement_scale(
+        state.measurement_scale, aside, state.dives
     )
 
 
@@ -411,7 +403,7 @@ def _opened(state: JointState, told: Step | None) -> JointState:
 def _estimate(state: JointState, seen: Observation, params: JointParams, slipping: Slipping) -> JointEstimate:
     """What the state says of the speed and of the flow on a dive."""
     x, own = state.x, float(state.x[OWN])
-    cov, calm = state.cov.copy(), math.sqrt(state.doubt / state.tested)
+    cov, calm = state.cov.copy(), math.sqrt(state.measurement_scale / state.tested)
     cov[OWN] *= calm  # the filter ran with what the tests take the noise for
     cov[:, OWN] *= calm
     slipping = replace(slipping, noise=slipping.noise * calm)
@@ -445,10 +437,12 @@ def expected_flow(
     ``ground`` (m/s, (2,)) is about how fast the glider goes over ground: a strong current differs along it.
     """
     n, lat = params.size, 0.0 if state.end is None else state.end.lat
-    q = gauss_markov.intensities(state.x[:n], state.sea, params)
+    q = gauss_markov.intensities(state.x[:n], state.process_scale, params)
     passage = gauss_markov.passage(max(start - state.t, 0.0), max(end - start, 1.0), lat, q, params)
     mean = passage.matrix @ state.x[:n]
     cov = passage.matrix @ state.cov[:n, :n] @ passage.matrix.T + passage.noise
     now = state.x[0:2] + state.x[2:4]
     crossed = gauss_markov.crossing(now, ground, max((start + end) / 2 - state.t, 0.0), params)
-    return mean[params.mean], np.asarray(cov[params.mean, params.mean] + state.sea * crossed**2 * np.eye(2))
+    return mean[params.mean], np.asarray(
+        cov[params.mean, params.mean] + state.process_scale * crossed**2 * np.eye(2)
+    )

@@ -11,7 +11,7 @@ from statistics import median
 import numpy as np
 
 from gliderwatch.estimation import kalman
-from gliderwatch.estimation.dive_measurement import USUAL_PITCH, are_apart, slip_at
+from gliderwatch.estimation.dive_measurement import USUAL_PITCH, slip_at
 from gliderwatch.estimation.kalman import JointInfo, JointParams, JointState
 from gliderwatch.estimation.kinematic_speed import KinematicSpeed, Ratios, kinematic_speed
 from gliderwatch.estimation.kinematic_speed import learn as learn_ratios
@@ -188,14 +188,14 @@ class SpeedParams:
 class SpeedState:
     """What is known after a dive.
 
-    ``joint`` estimate (None: no dive yet), ``normal`` speeds learnt, ``rolls`` (rad) of the first healthy
-    dives, ``rolled`` dives in a row that roll otherwise, ``slow`` Page's sum of small losses, ``doubted``
-    slow dives in a row that were not believed, ``misfits`` of the last dives, ``ratios`` of the speed to
-    what the glider tells of it; ``trim`` of the last normal dive, ``other`` speeds (m/s) of the last dives
-    in a row that may be a new way of flying.
+    ``filter``, the Kalman filter's (None: no dive yet), ``normal`` speeds learnt, ``rolls`` (rad) of the
+    first healthy dives, ``rolled`` dives in a row that roll otherwise, ``slow`` Page's sum of small losses,
+    ``doubted`` slow dives in a row that were not believed, ``misfits`` of the last dives, ``ratios`` of the
+    speed to what the glider tells of it; ``trim`` of the last normal dive, ``other`` speeds (m/s) of the
+    last dives in a row that may be a new way of flying.
     """
 
-    joint: JointState | None = None
+    filter: JointState | None = None
     normal: Normal = Normal()
     rolls: tuple[float, ...] = ()
     rolled: int = 0
@@ -229,8 +229,6 @@ def step(
 
     ``frozen``: an incident is open, so that nothing is learnt of what is normal.
     """
-    if state.joint is not None and state.joint.end is not None and dive.start is not None:
-        state = SpeedState() if are_apart(state.joint.end, dive.start) else state
     at = setting(dive.features)
     learnt = speed_range(state.normal, at, params.learning) if params.learning else None
     normal = learnt or SpeedRange(params.low, (params.low + params.high) / 2, params.high, 0)
@@ -238,11 +236,11 @@ def step(
     usual = learnt.usual if learnt else None
     # the first of two dives may have been half over when it happened
     told = kinematic_speed(state.ratios, dive.features)
-    estimate, info = kalman.step(state.joint, dive, params.joint, usual, hint=1 <= rolled <= 2, tells=told)
+    estimate, info = kalman.step(state.filter, dive, params.joint, usual, hint=1 <= rolled <= 2, tells=told)
     if info is None:
         flag, reason = _of_reckoning_alone(state, dive, told, normal, params)
         return state, Verdict(flag, reason, normal, None)
-    state = replace(state, joint=estimate, rolled=rolled, misfits=_misfits(state, info))
+    state = replace(state, filter=estimate, rolled=rolled, misfits=_misfits(state, info))
     flag, reason = _wrong(state, info, params)
     if flag is None and not reason:
         state, flag, reason = _slow_or_fast(state, info, told, normal, params)
@@ -348,7 +346,7 @@ def _by_reckoning(
     why: str, state: SpeedState, told: KinematicSpeed | None, normal: SpeedRange, params: SpeedParams
 ) -> tuple[Flag | None, str]:
     """The flag that depth rate and pitch alone give, where the way says nothing because of ``why``."""
-    if told is None or not told.is_prompt or state.joint is None or not normal.dives:
+    if told is None or not told.is_prompt or state.filter is None or not normal.dives:
         return None, why
     # no course that was steered can look like this: the bound is wide because nothing else confirms it
     left, sigma = 1 - _usual_slip(params), params.confidence * told.sigma
@@ -446,6 +444,6 @@ def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: S
         state = replace(state, ratios=learn_ratios(state.ratios, dive.features, own[0]))
     if params.learning is None or info.told is not None:
         return state
-    before = state.joint.dives - 1 if state.joint else 0
+    before = state.filter.dives - 1 if state.filter else 0
     normal = learn(state.normal, info.estimate.speed, at, dive.features.duration, params.learning, before)
     return replace(state, normal=normal)

@@ -87,5 +87,28 @@ TIDE_GRADIENT = 0.02
 """m/s over `FLOW_SCALE`: by how much that differs in space."""
 DAC_NOISE = 0.02
 """m/s, a component: error of a depth-averaged current of a healthy glider."""
-MOST_CURRENTS = 300
+SEA_EDDIES = (0.02, 0.04, 0.08, 0.16)
+"""m/s: sizes of eddies that are tried; each explanation of the currents takes the one that suits it best."""
+SEA_MEAN, SEA_TIDE, SEA_TIDE_GRADIENT = 0.2, 0.25, 0.08
+"""m/s: mean flow, a part of a tide, and by how much that differs over `FLOW_SCALE`, where the sea is not
+known: wide, not wrong (shelf seas have M2 of 0.7 m/s)."""
+CHECK_WINDOW = 4 * 86400.0
+"""s: dives of this long are compared with those of the neighbours."""
+LEAST_DIVES, MOST_DIVES = 4, 16
+"""Dives since a fault that are needed to tell it, and that are looked back over: at 3 h, half a day and two
+days."""
+LEAST_LOSS, LEAST_TURN = 0.15, 0.12
+"""Part of the speed, and rad: smaller faults are not told by the fleet. A healthy glider's current is 5 to 10
+% of its speed off."""
+USUAL_SLIP, USUAL_TURN = 0.08, 0.05
+"""Part of the speed, and rad: by how much the current of a healthy glider is off, all the time: the angle of
+attack that is not allowed for on board, and how the compass is mounted."""
+SURE, CLEARER, SHARED_SURE = 16.0, 6.0, 40.0
+"""Twice the log likelihood ratio of a fault to none, and to the likeliest fault of another glider, at which
+it is told; and the first for an error that all share: where all fly one way a current looks alike."""
+BETWEEN_DIVES = 6 * 3600.0
+"""s at the surface after which a dive is not taken to begin where the one before ended."""
+DOUBTED_SPEED = 0.15
+"""m/s: error, along its course, of the current of a glider that flies out of its range."""
+MOST_CURRENTS = 200
 """Currents that are taken at most, the nearest in space and time: the rest would only cost time."""

@@ -41,9 +41,34 @@ from gliderwatch.navigation.geodesy import to_plane
 from gliderwatch.sea.tides import Constituent
 
 TIDES = (Constituent.M2, Constituent.K1)
+Places = Sequence[tuple[Fix, Fix]]
+"""Dives by the fixes before and after them."""
 _ALONG = np.array([-math.sqrt(0.6), 0.0, math.sqrt(0.6)]) / 2 + 0.5
 _WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18
 """Gauss-Legendre points and weights on a dive: exact to 1e-5 for M2 over 6 h."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlowSizes:
+    """Usual sizes (m/s, a component) of the parts of the flow.
+
+    ``eddy`` of one Gaussian, ``mean`` of what is the same everywhere, ``tide`` of a cosine or sine part, and
+    by how much that differs over `FLOW_SCALE` (``gradient``), of each of the ``tides``.
+    """
+
+    eddy: float = EDDY
+    mean: float = MEAN_FLOW
+    tide: float = TIDE
+    gradient: float = TIDE_GRADIENT
+    tides: tuple[Constituent, ...] = TIDES
+
+    def deviations(self, eddies: int) -> Array:
+        """Those of all coefficients, the eddies' first."""
+        plane = [self.tide, self.gradient, self.gradient]
+        return np.array([self.eddy] * eddies + [self.mean] * 2 + plane * (4 * len(self.tides)))
+
+
+USUAL = FlowSizes()
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +76,8 @@ class DiveCurrent:
     """The depth-averaged current of a dive between two fixes: ``u``, ``v`` (m/s, true north).
 
     ``noise`` (m/s) is its error in each component; ``course`` (unit vector east, north; zeros: none) that of
-    the glider through the water, and ``doubt`` (m/s) the error along it where its speed is not sure.
+    the glider through the water, ``speed`` (m/s) what it takes for its own, and ``doubt`` (m/s) the error
+    along the course where that is not sure.
     """
 
     glider: str
@@ -62,6 +88,7 @@ class DiveCurrent:
     noise: float = DAC_NOISE
     course: tuple[float, float] = (0.0, 0.0)
     doubt: float = 0.0
+    speed: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +104,9 @@ class FleetFlow:
     nearest: float
 
 
-def basis(place: Array, t: Array, centres: Array) -> tuple[Array, Array]:
+def basis(
+    place: Array, t: Array, centres: Array, tides: Sequence[Constituent] = TIDES
+) -> tuple[Array, Array]:
     """Rows of u and v ((n, L) each) at places ((n, 2), in units of `FLOW_SCALE`) and times (s, (n,)).
 
     First the streamfunction's Gaussians about ``centres`` ((m, 2)), then the mean u and v, then of each tide
@@ -86,18 +115,12 @@ def basis(place: Array, t: Array, centres: Array) -> tuple[Array, Array]:
     away = place[:, None, :] - centres
     psi = np.exp(-np.square(away).sum(-1) / (2 * SPREAD)) / math.sqrt(SPREAD)
     plane = np.column_stack([np.ones(len(place)), place - 0.5])
-    waves = [wave(each.omega * t) for each in TIDES for wave in (np.cos, np.sin)]
+    waves = [wave(each.omega * t) for each in tides for wave in (np.cos, np.sin)]
     tide = np.hstack([wave[:, None] * plane for wave in waves])
     none, ones, still = np.zeros_like(tide), np.ones((len(place), 1)), np.zeros((len(place), 1))
     u = np.hstack([psi * away[..., 1], ones, still, tide, none])
     v = np.hstack([-psi * away[..., 0], still, ones, none, tide])
     return u, v
-
-
-def deviations(n: int) -> Array:
-    """Usual sizes (m/s) of the coefficients, the eddies' ``n`` first."""
-    plane = [TIDE, TIDE_GRADIENT, TIDE_GRADIENT]
-    return np.array([EDDY] * n + [MEAN_FLOW] * 2 + plane * (4 * len(TIDES)))
 
 
 def fleet_flow(currents: Iterable[DiveCurrent], glider: str, start: Fix, end: Fix) -> FleetFlow | None:
@@ -111,15 +134,11 @@ def fleet_flow(currents: Iterable[DiveCurrent], glider: str, start: Fix, end: Fi
         return None
     dives = [(each.start, each.end) for each in others]
     centres = _centres([start, end, *(fix for dive in dives for fix in dive)], start)
-    own, own_t = _rows([(start, end)], start, centres)
-    seen, seen_t = _rows(dives, start, centres)
+    own, own_t = _rows([(start, end)], start, centres, USUAL)
+    seen, seen_t = _rows(dives, start, centres, USUAL)
     fading = len(centres) + 2
     cross = _covariance(own, own_t, seen, seen_t, fading)
-    matrix = _covariance(seen, seen_t, seen, seen_t, fading)
-    for k, each in enumerate(others):
-        course = np.array(each.course)
-        part = slice(2 * k, 2 * k + 2)
-        matrix[part, part] += each.noise**2 * np.eye(2) + each.doubt**2 * np.outer(course, course)
+    matrix = _covariance(seen, seen_t, seen, seen_t, fading) + _noise(others)
     gain = cho_solve(cho_factor(matrix, lower=True), cross.T).T
     measured = np.array([[each.u, each.v] for each in others]).ravel()
     cov = _covariance(own, own_t, own, own_t, fading) - gain @ cross.T
@@ -131,6 +150,16 @@ def fleet_flow(currents: Iterable[DiveCurrent], glider: str, start: Fix, end: Fi
         tuple(sorted({each.glider for each in others})),
         nearest,
     )
+
+
+def currents_covariance(currents: Sequence[DiveCurrent], sizes: FlowSizes) -> Array:
+    """Covariance (m2/s2, (2 n, 2 n): u, v of each in turn) of depth-averaged currents, their noise
+    included."""
+    dives = [(each.start, each.end) for each in currents]
+    origin = dives[-1][0]
+    centres = _centres([fix for dive in dives for fix in dive], origin)
+    rows, t = _rows(dives, origin, centres, sizes)
+    return _covariance(rows, t, rows, t, len(centres) + 2) + _noise(currents)
 
 
 def fused(first: tuple[Array, Array], second: tuple[Array, Array]) -> tuple[Array, Array]:
@@ -178,7 +207,7 @@ def _centres(fixes: Sequence[Fix], origin: Fix) -> Array:
     return np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
 
 
-def _rows(dives: Sequence[tuple[Fix, Fix]], origin: Fix, centres: Array) -> tuple[Array, Array]:
+def _rows(dives: Places, origin: Fix, centres: Array, sizes: FlowSizes) -> tuple[Array, Array]:
     """The basis averaged along each dive ((2 n, L): u, v of each in turn), scaled by usual sizes; times of u,
     v (s after the origin's, (2 n,))."""
     a, b = _plane([d[0] for d in dives], origin), _plane([d[1] for d in dives], origin)
@@ -187,10 +216,20 @@ def _rows(dives: Sequence[tuple[Fix, Fix]], origin: Fix, centres: Array) -> tupl
     times = (t0[:, None] + _ALONG * (t1 - t0)[:, None]).ravel()
     mean = [
         np.einsum("npl,p->nl", part.reshape(len(dives), len(_ALONG), -1), _WEIGHTS)
-        for part in basis(places + 0.5, times, centres + 0.5)
+        for part in basis(places + 0.5, times, centres + 0.5, sizes.tides)
     ]
     rows = np.stack(mean, axis=1).reshape(2 * len(dives), -1)
-    return rows * deviations(len(centres)), np.repeat((t0 + t1) / 2, 2)
+    return rows * sizes.deviations(len(centres)), np.repeat((t0 + t1) / 2, 2)
+
+
+def _noise(currents: Sequence[DiveCurrent]) -> Array:
+    """Covariance of the errors of currents."""
+    out = np.zeros((2 * len(currents), 2 * len(currents)))
+    for k, each in enumerate(currents):
+        course = np.array(each.course)
+        part = slice(2 * k, 2 * k + 2)
+        out[part, part] = each.noise**2 * np.eye(2) + each.doubt**2 * np.outer(course, course)
+    return out
 
 
 def _covariance(a: Array, ta: Array, b: Array, tb: Array, fading: int) -> Array:

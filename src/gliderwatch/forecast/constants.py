@@ -82,6 +82,9 @@ STEADY_HEADING = 0.3
 """Length of the mean heading vector from which the speed of a dive shows."""
 FAR = 1e6
 """m to the goal of a course of which no waypoint is known: no dive reaches it."""
+HEADING_ERROR, COURSE_CHANGE = 0.1, 0.5
+"""rad: how well the mean heading of a dive shows how it was steered, and by how much a course usually differs
+from the one before, on the same leg; beyond that it is a new leg."""
 MOST_ALLOWANCE = 0.8
 """Sine of the angle that allowance for a current takes at most."""
 FLOORS = (0.03, 0.01, 0.01, 0.01)

@@ -25,7 +25,7 @@ def look_ahead(estimate: Estimate, over_ground: Array | None) -> Outlook | None:
 
     ``over_ground`` (m/s, (2,)) is how it went then: a strong current differs along the way.
     """
-    joint, learner = estimate.joint.speed.joint, estimate.learner
+    joint, learner = estimate.speed.filter, estimate.learner
     if joint is not None:
         return _of_joint(joint, np.zeros(2) if over_ground is None else over_ground)
     if learner.learner is None or learner.current is None:

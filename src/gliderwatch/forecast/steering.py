@@ -11,11 +11,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gliderwatch.forecast.constants import FAR, MOST_ALLOWANCE, SLOWEST, STEADY_HEADING
-from gliderwatch.model import Array
+from gliderwatch.forecast.constants import (
+    COURSE_CHANGE,
+    FAR,
+    HEADING_ERROR,
+    MOST_ALLOWANCE,
+    SLOWEST,
+    STEADY_HEADING,
+)
+from gliderwatch.model import Array, readonly
 
 WAYS = ("as before", "beside the waypoint", "at the waypoint", "at the waypoint against the current")
 """The ways of steering, in the order of what is told of them."""
+COURSES = readonly(np.arange(-math.pi, math.pi, math.radians(1.0)))
+"""rad: courses that are thought of where no waypoint is known."""
 AGAINST = "on the course before, against the current"
 """The last of them, where no waypoint is known."""
 
@@ -66,17 +75,26 @@ def courses(plan: Plan, time: float) -> tuple[Course, ...]:
     return before, aside, _along(plan, time, 0.0, against=False), _along(plan, time, 0.0, against=True)
 
 
-def steered(heading: Array, speed: float, current: Array) -> float | None:
+def steered(heading: Array, speed: float, current: Array, before: float | None) -> float | None:
     """The course (rad, counter-clockwise from east) that a glider meant to make good on a dive.
 
     With the mean ``heading`` vector ((2,)) that it steered it reckoned with a ``speed`` through the water and
-    the ``current`` ((2,), both m/s) of the dive before. None where it circled.
+    the ``current`` ((2,), both m/s) of the dive before. In a current stronger than it several courses lead to
+    one heading: then the one ``before`` tells which. None where it circled.
     """
-    length = float(np.hypot(*heading))
-    if length < STEADY_HEADING:
+    if float(np.hypot(*heading)) < STEADY_HEADING:
         return None
-    meant = speed * heading / length + current
-    return math.atan2(meant[1], meant[0])
+    left = np.cos(COURSES) * current[1] - np.sin(COURSES) * current[0]
+    aims = COURSES - np.arcsin(np.clip(left / max(speed, SLOWEST), -MOST_ALLOWANCE, MOST_ALLOWANCE))
+    squares = (_apart(aims, math.atan2(heading[1], heading[0])) / HEADING_ERROR) ** 2
+    if before is not None:
+        squares += np.minimum(_apart(COURSES, before) / COURSE_CHANGE, 1.0) ** 2
+    return float(COURSES[int(np.argmin(squares))])
+
+
+def _apart(angles: Array, angle: float) -> Array:
+    """By how much angles (rad) differ from one."""
+    return np.asarray(np.abs((angles - angle + math.pi) % (2 * math.pi) - math.pi))
 
 
 def _along(plan: Plan, time: float, beside: float, against: bool) -> Course:

@@ -9,7 +9,6 @@ from statistics import median
 
 import numpy as np
 
-from gliderwatch.estimation.dive_measurement import are_apart
 from gliderwatch.forecast import timing
 from gliderwatch.forecast.constants import (
     ALIKE,
@@ -166,13 +165,11 @@ def learn(
 
     Dives come in order; one whose current was corrected is taken again from the state before it.
     ``waypoint`` (degrees) is the last one reported until now; ``expected`` what was made of ``state``, with
-    which the ellipse is calibrated (None: nothing was). A new deployment starts from nothing.
+    which the ellipse is calibrated (None: nothing was).
     """
     end = dive.end
     if end is None:
         return state
-    if state.fix is not None and are_apart(state.fix, dive.start or end):
-        state = Surfacings()
     after = replace(
         _timed(state, dive, end),
         scores=_scores(state, dive, end),
@@ -183,7 +180,9 @@ def learn(
     )
     if after.bearing is None and state.current is not None and state.speed is not None:
         flown = _flown(after, dive).heading if dive.track is not None else None
-        course = None if flown is None else steered(np.array(flown), state.speed, np.array(state.current))
+        course = None
+        if flown is not None:
+            course = steered(np.array(flown), state.speed, np.array(state.current), state.bearing)
         after = replace(after, bearing=course)
     return _driven(_adrift(_flown(after, dive), state.fix, dive), dive)
 

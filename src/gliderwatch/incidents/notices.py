@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gliderwatch.fleet.advice import Advice
+from gliderwatch.fleet.cross_check import Hypothesis
+from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.model import (
     Assessment,
     Call,
@@ -97,12 +99,13 @@ class Acknowledged:
 @dataclass(frozen=True, slots=True)
 class Surfaced:
     """A surfacing; ``previous`` is the time of the one before (s), ``expected`` the next; ``advice`` where to
-    look next for a field, by its name."""
+    look next for a field, by its name, ``layers`` how deep to fly to keep on them."""
 
     dive: Assessment
     previous: float | None
     expected: NextSurfacing | None
     advice: tuple[tuple[str, Advice], ...] = ()
+    layers: LayerAdvice | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -337,6 +340,19 @@ class Irregularity:
     what: ClockStep | OldDates | TwoGliders
 
 
+# ----------------------------------------------------------------- neighbours
+
+
+@dataclass(frozen=True, slots=True)
+class DiffersFromNeighbours:
+    """The currents of a glider do not fit those of its ``neighbours``, of which the next is ``nearest`` (m)
+    away: ``found`` explains it. Where that is of no glider all have it alike."""
+
+    found: Hypothesis
+    neighbours: tuple[str, ...]
+    nearest: float
+
+
 Content = (
     Opened
     | StillOpen
@@ -355,6 +371,7 @@ Content = (
     | CalledWithoutFile
     | SendsAgain
     | Irregularity
+    | DiffersFromNeighbours
 )
 
 

@@ -14,6 +14,7 @@ from gliderwatch.incidents.aborts import Episode
 from gliderwatch.incidents.acknowledgement import Acks
 from gliderwatch.incidents.calls import Empty
 from gliderwatch.incidents.constants import FLOW_CHANGE, MARKS, NEWS, REGIME_DIVES, SLACK, SPEED_CHANGE, WEEK
+from gliderwatch.incidents.neighbours import Comparison
 from gliderwatch.incidents.notices import (
     Cleared,
     Corrected,
@@ -26,6 +27,7 @@ from gliderwatch.incidents.notices import (
 from gliderwatch.incidents.overdue import Silence
 from gliderwatch.incidents.situation import SituationFacts, next_surfacing, situation
 from gliderwatch.incidents.unjudged import Unknown
+from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.model import Assessment, Incident, Kind, Severity
 
 # ----------------------------------------
@@ -57,8 +59,9 @@ class NotificationState:
 
         ``surfaced`` is the surfacing of the last notice (s), ``silences`` what was sent of its staying away
     (`incidents.overdue`), ``unknown`` of dives that could not be judged (`incidents.unjudged`), ``aborts`` of
-    aborts (`incidents.aborts`), ``empty`` of calls without a file (`incidents.calls`), ``irregularities`` the
-    ids of those of its files, ``renewed`` the dive (s) of the last notice of a new way of flying.
+    aborts (`incidents.aborts`), ``empty`` of calls without a file (`incidents.calls`), ``neighbours`` how it
+    stood to them (`incidents.neighbours`), ``irregularities`` the ids of those of its files, ``renewed`` the
+    dive (s) of the last notice of a new way of flying.
     """
 
     threads: tuple[Thread, ...] = ()
@@ -68,6 +71,7 @@ class NotificationState:
     aborts: tuple[Episode, ...] = ()
     empty: Empty | None = None
     irregularities: tuple[str, ...] = ()
+    neighbours: Comparison | None = None
     renewed: float | None = None
 
 
@@ -85,12 +89,13 @@ def due_notifications(
     notices: bool,
     acks: Acks = NO_ACKS,
     advice: tuple[tuple[str, Advice], ...] = (),
+    layers: LayerAdvice | None = None,
 ) -> tuple[NotificationState, list[Notice]]:
     """The messages to send now, and what will have been said then.
 
     `notices`: whether anyone wants a notice of each surfacing. An incident that somebody has acknowledged
     (`acks`) is not brought to mind, unless it has grown worse since. `advice`: where to look next, by the
-    name of the field.
+    name of the field; `layers`: how deep to fly next.
     """
     latest = known.last_surfacing(float("inf"))
     if latest is None:
@@ -118,7 +123,7 @@ def due_notifications(
         identity = f"{latest.glider}/surfacing/{latest.t_dive:.0f}"
         before_it = known.last_surfacing(latest.t_surface - 1.0)
         previous = before_it.t_surface if before_it is not None else None
-        content = Surfaced(latest, previous, next_surfacing(known, latest), advice)
+        content = Surfaced(latest, previous, next_surfacing(known, latest), advice, layers)
         info = Severity.INFO
         alerts.append(
             Notice(identity, "", latest.glider, latest.t_surface, Kind.SURFACING, info, info, content)
@@ -157,7 +162,7 @@ def _new_regime(
 
 def unacknowledged(said: NotificationState, incidents: tuple[Incident, ...], acks: Acks) -> frozenset[str]:
     """The threads of what goes on and nobody has taken on: incidents, and gliders that stay away, cannot be
-    judged, have aborted, or call and send nothing."""
+    judged, have aborted, call and send nothing, or differ from their neighbours."""
     matched = _matched(said.threads, incidents)
     threads = {
         thread.id
@@ -171,6 +176,8 @@ def unacknowledged(said: NotificationState, incidents: tuple[Incident, ...], ack
     threads |= {episode.id for episode in said.aborts if episode.cleared is None}
     if said.empty is not None and not said.empty.is_over:
         threads.add(said.empty.id)
+    if said.neighbours is not None and said.neighbours.id:
+        threads.add(said.neighbours.id)
     return frozenset(threads | {silence.id for silence in said.silences if silence.called is None})
 
 

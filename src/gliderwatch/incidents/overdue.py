@@ -404,7 +404,7 @@ def _absence(call: ExpectedCall, known: SilenceFacts, fleet: Fleet, now: float) 
     if expected is None:
         expected = NextSurfacing(call.heard, call.t, 0.0, None, None, 0.0, 0.0, 0.0, "")
     place = _both(last.lat, last.lon) if last is not None else None
-    flow = _current(last) if last is not None else None
+    flow = current(last) if last is not None else None
     foreseen = expected if call.heard <= expected.after + LATER_CALL * call.interval else None
     return Absence(
         glider=known.glider,
@@ -421,7 +421,7 @@ def _absence(call: ExpectedCall, known: SilenceFacts, fleet: Fleet, now: float) 
     )
 
 
-def _current(dive: Assessment) -> tuple[float, float] | None:
+def current(dive: Assessment) -> tuple[float, float] | None:
     """The last known current (east, north; m/s) of a dive: the estimated one, else the reference."""
     estimated = _both(dive.flow_u, dive.flow_v)
     return _both(dive.reference_u, dive.reference_v) if estimated is None else estimated

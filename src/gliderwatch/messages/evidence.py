@@ -25,7 +25,7 @@ SURE = 4.0  # standard errors beyond which a misfit is one
 STRONG, MINOR = 3.0, 0.5  # weights of what decides, and of what is good to know; others: 1
 LINES = 3  # on each side, for a phone
 LEARNT = 1.6  # times the usual speed: a bound above it was not learnt from dives
-_CERTAIN = 0.99  # more than that is never claimed: what is modelled is not all
+CERTAIN = 0.99  # more than that is never claimed: what is modelled is not all
 _WORDS = ((0.975, "almost sure"), (0.9, "very likely"), (0.75, "likely"), (0.0, "not sure"))
 
 
@@ -81,7 +81,7 @@ def certainty(kind: Kind, a: Assessment, dives: int) -> str:
     if chance is None:
         return f"likely ({row})" if dives > 1 else "not sure (1 dive)"
     word = next(word for least, word in _WORDS if chance >= least)
-    return f"{word} ({100 * min(chance, _CERTAIN):.0f} %)"
+    return f"{word} ({100 * min(chance, CERTAIN):.0f} %)"
 
 
 def _of_speed(a: Assessment) -> float | None:

@@ -20,6 +20,7 @@ from gliderwatch.incidents.notices import (
     StillOpen,
     Surfaced,
 )
+from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.messages.causes import Likely, likeliest
 from gliderwatch.messages.evidence import (
     certainty,
@@ -178,7 +179,10 @@ def surfaced(glider: str, content: Surfaced) -> Text:
             where(a),
             next_call(content.expected),
         ),
-        tuple((f"Look next for {clean(name, 64)}", _advice(each)) for name, each in content.advice),
+        (
+            *((f"Look next for {clean(name, 64)}", _advice(each)) for name, each in content.advice),
+            *((("Fly next", _band(content.layers, a.t_dive)),) if content.layers is not None else ()),
+        ),
     )
     when = utc(a.t_surface)[11:]
     return titled(glider, f"surfaced {when}: {exact_speed(a)}", f", {flag_words(a, short=True)}"), page
@@ -210,6 +214,20 @@ def _advice(advice: Advice) -> str:
     """Heading and waypoint of an advice, and what it is good for."""
     steer = f"steer {degrees(advice.heading):03.0f} deg true to {place(advice.lat, advice.lon)}"
     return f"{steer}: takes {100 * advice.variance:.1f} % off the uncertainty"
+
+
+def _band(advice: LayerAdvice, since: float) -> str:
+    """How deep to fly, and why; of which segment, if that was before the dive that began `since` (s)."""
+    found = ", ".join(f"{x.top:.0f} to {x.bottom:.0f} m ({x.confidence:.0%})" for x in advice.layers)
+    what = f"{clean(advice.sensor, 40)} layer: {found}" if found else f"no {clean(advice.sensor, 40)} layer"
+    depths = advice.full if advice.band is None else advice.band
+    words = f"{depths.top:.0f} to {depths.bottom:.0f} m"
+    if advice.band is None:
+        words = f"all depths, {words}{f' ({advice.mode.value}: {advice.why})' if advice.why else ''}"
+    elif advice.full_casts:
+        words += f", after {advice.full_casts} casts from {advice.full.top:.0f} to {advice.full.bottom:.0f} m"
+    when = f" [after the segment until {utc(advice.t)}]" if advice.t < since else ""
+    return "; ".join((f"{words}; {what}", *advice.notes)) + when
 
 
 def flag_words(assessment: Assessment, *, short: bool = False) -> str:

@@ -10,7 +10,14 @@ from collections.abc import Callable
 from typing import Any
 
 from gliderwatch.incidents import notices as n
-from gliderwatch.messages import call_text, incident_text, irregularity_text, overdue_text, unjudged_text
+from gliderwatch.messages import (
+    call_text,
+    incident_text,
+    irregularity_text,
+    neighbours_text,
+    overdue_text,
+    unjudged_text,
+)
 from gliderwatch.messages.formatting import clean, utc
 from gliderwatch.messages.template import Page, Text, titled, told_and_todo
 from gliderwatch.model import Alert, Kind, Severity
@@ -32,6 +39,7 @@ _WRITERS: dict[type, Callable[[str, Any], Text]] = {
     n.Resumed: call_text.resumed,
     n.CalledWithoutFile: call_text.without_file,
     n.SendsAgain: call_text.sends_again,
+    n.DiffersFromNeighbours: neighbours_text.differs,
     n.Irregularity: irregularity_text.irregular,
 }
 """How each content of a notice reads, of which glider."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from gliderwatch.fleet.cross_check import Fault, Hypothesis
 from gliderwatch.incidents.notices import (
     Aborted,
     AbortReport,
@@ -19,6 +20,7 @@ from gliderwatch.incidents.notices import (
     Cleared,
     Content,
     Corrected,
+    DiffersFromNeighbours,
     DriftEllipse,
     Fleet,
     NewRegime,
@@ -207,6 +209,12 @@ def _without_file(now: float) -> Alert:
     return _message(Kind.CALL, Severity.WARNING, now, CalledWithoutFile(calls))
 
 
+def _neighbours(now: float) -> Alert:
+    found = Hypothesis("sample", Fault.LOSS, now - 18 * _HOUR, 6, 0.41, 0.06, 43.0)
+    content = DiffersFromNeighbours(found, ("other", "third"), 8e3)
+    return _message(Kind.NEIGHBOURS, Severity.CRITICAL, now, content)
+
+
 def _surfacing(now: float) -> Alert:
     dive = _at(_HEALTHY, now)
     return _message(Kind.SURFACING, Severity.INFO, now, Surfaced(dive, now - 4 * _HOUR, _next(now)))
@@ -253,6 +261,7 @@ SAMPLES: dict[Kind, Callable[[float], Alert]] = {
     Kind.UNKNOWN: _unknown,
     Kind.ABORT: _abort,
     Kind.CALL: _without_file,
+    Kind.NEIGHBOURS: _neighbours,
     Kind.ALL_CLEAR: _all_clear,
     Kind.REMINDER: _reminder,
     Kind.CORRECTION: _correction,

@@ -10,6 +10,8 @@ from __future__ import annotations
 SPACING = 30.0
 """s: finer samples are averaged to this. A glider turns and pitches in minutes, and a checkpoint that carries
 a dive on to the next segment stays small also for 4 s data."""
+SCIENCE_SPACING = 10.0
+"""s: the same for what the science computer sends: 1 to 3 m of depth, a layer's edge."""
 FULL_POWER = 24.0
 """W of a thruster that is fully on. Power goes with the square of the setting: electa-2022, 2.9 W at 35 % and
 8.6 W at 60 %."""

@@ -21,6 +21,7 @@ from gliderwatch.navigation.constants import (
     LONGEST_STEP,
     MOSTLY_STEEP,
     RECKONING_GROWS,
+    SCIENCE_SPACING,
     SHORTEST_STEP,
     SLOWEST_RECKONED,
     SPACING,
@@ -38,19 +39,22 @@ _KEPT = ("pitch", "roll", "depth", "speed_onboard", "dr_state", "dr_time", "thru
 _PAIRS = (("fix_lat", "fix_lon"), ("dr_lat", "dr_lon"))
 _EXACT = ("fix_", "current_")
 """Beginnings of the names of quantities of which every value matters."""
+_SCIENCE = ("temperature", "conductivity", "science_pressure", "oxygen")
 _FIRST = ("dr_", "waypoint_", "gps_status", "inflections")
 """Of those that jump, the first in each bin is kept: a mean would be a value that never was."""
 
 
 def downsample(quantities: Mapping[str, Series]) -> dict[str, Series]:
-    """The quantities of a segment with samples finer than `SPACING` averaged.
+    """The quantities of a segment with samples finer than `SPACING`, of science finer than
+    `SCIENCE_SPACING`, averaged.
 
     Angles of compass are averaged as vectors; of what jumps the first in each bin is kept, fixes
     and currents stay whole. Doing it twice changes nothing.
     """
     out = {}
     for name, series in quantities.items():
-        if name.startswith(_EXACT) or len(starts := _bins(series.t)) == len(series):
+        spacing = SCIENCE_SPACING if name in _SCIENCE else SPACING
+        if name.startswith(_EXACT) or len(starts := _bins(series.t, spacing)) == len(series):
             out[name] = series
         elif name.startswith(_FIRST):
             out[name] = Series(readonly(series.t[starts]), readonly(series.v[starts]))
@@ -62,9 +66,9 @@ def downsample(quantities: Mapping[str, Series]) -> dict[str, Series]:
     return out
 
 
-def _bins(t: Array) -> NDArray[np.intp]:
-    """Index of the first sample in each bin of `SPACING` seconds that holds any."""
-    bins = np.floor(t / SPACING)
+def _bins(t: Array, spacing: float) -> NDArray[np.intp]:
+    """Index of the first sample in each bin of `spacing` seconds that holds any."""
+    bins = np.floor(t / spacing)
     return np.flatnonzero(np.concatenate([[True], bins[1:] != bins[:-1]])) if len(t) else np.empty(0, np.intp)
 
 

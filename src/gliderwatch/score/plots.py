@@ -1,22 +1,20 @@
-"""A page of plots: one HTML file that needs nothing else. The only module that draws."""
+"""A page of plots: one HTML file that needs nothing else."""
 
 from __future__ import annotations
 
 import html
 import io
 import math
-import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
-from gliderwatch.errors import GliderwatchError
+from gliderwatch.figures.plots import COLOURS, as_svg, library
 from gliderwatch.score.measures import FaultScore
 from gliderwatch.score.summary import Summary, tables
 
-_COLOURS = ("#1f5f8b", "#c4572e", "#3d8b5f", "#7b5ea7", "#a08a2c", "#555555")
 _COLUMNS = 4
 _HEAD = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>gliderwatch score</title><style>
@@ -26,27 +24,8 @@ svg { width: 100%; height: auto } pre { overflow-x: auto; font-size: 13px; line-
 """
 
 
-def pyplot() -> Any:
-    """The library that draws. Raises GliderwatchError where it is not installed."""
-    try:
-        import matplotlib  # noqa: PLC0415 (only this page needs it)
-    except ImportError:
-        raise GliderwatchError(
-            f"the page of plots needs matplotlib, which is not installed: {sys.executable} -m pip install "
-            "matplotlib"
-        ) from None
-    matplotlib.use("svg")
-    matplotlib.rcParams.update(
-        {"svg.hashsalt": "gliderwatch", "font.size": 9, "axes.grid": True, "grid.alpha": 0.3}
-    )
-    import matplotlib.pyplot  # noqa: PLC0415
-
-    return matplotlib.pyplot
-
-
 def write_page(path: Path, summary: Summary) -> None:
-    """Write the page. Raises GliderwatchError without the library that draws."""
-    library = pyplot()
+    """Write the page."""
     parts = [_HEAD, f"<p>{summary.gliders} runs; version {html.escape(summary.version)}.</p>"]
     for is_real, where in ((False, "Simulated gliders"), (True, "Faults grafted onto real missions")):
         some = [s for s in summary.faults if s.is_real == is_real and s.sea == ""]
@@ -56,31 +35,30 @@ def write_page(path: Path, summary: Summary) -> None:
             f"<h2>{where}</h2><h3>Delay against the size of the fault</h3>",
             "<p>Hours from the onset to the right message: median and, fainter, 90 %. The number is the "
             "part detected; a cross at the top is a delay without end.</p>",
-            _by_fault(library, [s for s in some if s.expected is not None], _draw_delay),
+            _by_fault([s for s in some if s.expected is not None], _draw_delay),
             "<h3>False messages against the size of the fault</h3>",
             "<p>Messages of another flag than the one expected, a glider-month after the onset (95 %).</p>",
-            _by_fault(library, some, _draw_unexpected),
+            _by_fault(some, _draw_unexpected),
         ]
     if summary.roc:
         parts += [
             "<h2>Other bounds of the normal speed</h2>",
             "<p>Detected losses of speed against false flag 1, as the normal range narrows; the numbers are "
             "the lower bound as part of the usual speed.</p>",
-            _roc(library, summary),
+            _roc(summary),
         ]
     parts.append(f"<h2>Tables</h2><pre>{html.escape(_text(summary))}</pre></body></html>\n")
     path.write_text("\n".join(parts), encoding="utf-8")
 
 
-def _by_fault(library: Any, scores: Sequence[FaultScore], draw: Any) -> str:
+def _by_fault(scores: Sequence[FaultScore], draw: Any) -> str:
     """One small plot for each fault, all with the same scale of values."""
     faults = list(dict.fromkeys(s.fault for s in scores))
     if not faults:
         return ""
     rows = math.ceil(len(faults) / _COLUMNS)
-    figure, axes = library.subplots(
-        rows, _COLUMNS, figsize=(12, 2.7 * rows), squeeze=False, sharey=True, layout="constrained"
-    )
+    figure = library().figure.Figure(figsize=(12, 2.7 * rows), layout="constrained")
+    axes = figure.subplots(rows, _COLUMNS, squeeze=False, sharey=True)
     estimators = list(dict.fromkeys(s.estimator for s in scores))
     hours = [h for s in scores for h in (s.hours_median, s.hours_90) if math.isfinite(h)]
     top = 1.15 * max(hours, default=1.0)
@@ -89,12 +67,12 @@ def _by_fault(library: Any, scores: Sequence[FaultScore], draw: Any) -> str:
     for fault, axis in zip(faults, axes.flat, strict=False):
         for i, estimator in enumerate(estimators):
             some = [s for s in scores if (s.fault, s.estimator) == (fault, estimator)]
-            draw(axis, some, _COLOURS[i % len(_COLOURS)], estimator, top)
+            draw(axis, some, COLOURS[i % len(COLOURS)], estimator, top)
         axis.set_title(fault, fontsize=10)
         axis.set_xlabel("size")
         axis.margins(x=0.15)
     axes.flat[0].legend(fontsize=7)
-    return _svg(library, figure)
+    return as_svg(figure)
 
 
 def _draw_delay(axis: Any, scores: Sequence[FaultScore], colour: str, name: str, top: float) -> None:
@@ -134,11 +112,12 @@ def _draw_unexpected(axis: Any, scores: Sequence[FaultScore], colour: str, name:
     axis.set_ylabel("a glider-month")
 
 
-def _roc(library: Any, summary: Summary) -> str:
-    figure, axis = library.subplots(figsize=(7, 4.5), layout="constrained")
+def _roc(summary: Summary) -> str:
+    figure = library().figure.Figure(figsize=(7, 4.5), layout="constrained")
+    axis = figure.subplots()
     for i, estimator in enumerate(dict.fromkeys(p.estimator for p in summary.roc)):
         points = [p for p in summary.roc if p.estimator == estimator]
-        colour = _COLOURS[i % len(_COLOURS)]
+        colour = COLOURS[i % len(COLOURS)]
         axis.plot(
             [p.false for p in points], [p.detected for p in points], "o-", color=colour, label=estimator
         )
@@ -150,14 +129,7 @@ def _roc(library: Any, summary: Summary) -> str:
     axis.set_xlabel("false flag 1 a glider-month")
     axis.set_ylabel("part of losses of speed detected")
     axis.legend()
-    return _svg(library, figure)
-
-
-def _svg(library: Any, figure: Any) -> str:
-    text = io.StringIO()
-    figure.savefig(text, format="svg", metadata={"Date": None})
-    library.close(figure)
-    return text.getvalue()[text.getvalue().index("<svg") :]
+    return as_svg(figure)
 
 
 def _text(summary: Summary) -> str:

@@ -21,6 +21,7 @@ from gliderwatch.service import liveness, preconditions, state_outage, transacti
 from gliderwatch.service.heartbeat import Upkeep
 from gliderwatch.service.intake import Intake
 from gliderwatch.service.liveness import BEAT, PidLock
+from gliderwatch.service.page_writer import PagesWritten, PageWriter
 from gliderwatch.service.routing import Routing
 from gliderwatch.service.runtime import Decoded, News, Runtime, build
 from gliderwatch.service.state_outage import StateOutage
@@ -154,7 +155,8 @@ class Daemon:
         self._news: SimpleQueue[News] = SimpleQueue()
         self._wake = threading.Event()
         self._stopping = False
-        self._intake = Intake(self._store, self._upkeep, self._wake, self._is_stopping)
+        self._pages = PageWriter(self._news.put)
+        self._intake = Intake(self._store, self._upkeep, self._wake, self._is_stopping, self._pages.changed)
         self._use(build(config, self._news, self._wake, workers))
 
     def _use(self, runtime: Runtime) -> None:
@@ -162,6 +164,7 @@ class Daemon:
         self._runtime = runtime
         self._intake.use(runtime)
         self._upkeep.use(runtime.config)
+        self._pages.use(runtime.config)
         self._caught_up = self._retry = False
         self._returned_in: float | None = None
         self._next_scan = self._next_beat = time.monotonic()
@@ -192,6 +195,7 @@ class Daemon:
         finally:
             liveness.notify("STOPPING=1")
             self._upkeep.stop()
+            self._pages.stop()
             self._runtime.stop()
             self._store.close()
             self._lock.end()
@@ -221,6 +225,8 @@ class Daemon:
             self._tick()
         if self._is_idle():
             self._retention.turn(self._runtime.config.state.keep_days, time.time(), time.monotonic())
+        if self._caught_up:
+            self._pages.turn(self._store.gliders(), time.monotonic())
         if time.monotonic() >= self._next_beat:
             self._beat()
 
@@ -256,6 +262,8 @@ class Daemon:
             self._intake.observe(news.path)
         elif isinstance(news, CacheChanged):
             self._retry = True
+        elif isinstance(news, PagesWritten):
+            return  # the turn that it woke has the next ones written
         elif news == signal.SIGHUP:
             self._reload()
         elif isinstance(news, EventsLost):

@@ -21,6 +21,7 @@ from gliderwatch.service import judgement, logs, transaction
 from gliderwatch.service.backlog import Job
 from gliderwatch.service.fields import write_goto
 from gliderwatch.service.heartbeat import Upkeep
+from gliderwatch.service.layers import layers_of, write_yo
 from gliderwatch.service.routing import Routing
 from gliderwatch.service.runtime import Decoded, Runtime
 from gliderwatch.slocum import folders
@@ -44,13 +45,20 @@ LONGEST = 120.0
 class Intake:
     """Takes files from the watcher to the state file.
 
-    `wake` is set when there are messages to deliver; while `is_stopping` nothing is begun any more.
+    `wake` is set when there are messages to deliver, `changed` called with each glider that has news;
+    while `is_stopping` nothing is begun any more.
     """
 
     def __init__(
-        self, store: Store, upkeep: Upkeep, wake: threading.Event, is_stopping: Callable[[], bool]
+        self,
+        store: Store,
+        upkeep: Upkeep,
+        wake: threading.Event,
+        is_stopping: Callable[[], bool],
+        changed: Callable[[str], None],
     ) -> None:
         self._store, self._upkeep, self._wake, self._is_stopping = store, upkeep, wake, is_stopping
+        self._changed = changed
         self._unmuted_until = time.time()
         self._returned: dict[str, tuple[float, float]] = {}
 
@@ -140,7 +148,7 @@ class Intake:
 
     def _judge_any(self, path: Path) -> None:
         """Of a science file it is the flight file beside it that is judged again, if it lacks the depth, or
-        if there are fields to be made."""
+        if there are fields to be made, or layers of the glider."""
         if folders.is_log(path.name):
             self._read_log(path)
         elif not folders.is_science(path.name):
@@ -148,8 +156,12 @@ class Intake:
         else:
             for flight in flight_files(path):
                 caches = self._runtime.decoder.cache_folders
-                wanted = bool(self._runtime.fields) and judgement.is_as_judged(flight, self._store)
-                if wanted or judgement.lacks_depth(flight, self._store, caches):
+                before = self._store.file(str(flight))
+                layers = before is not None and layers_of(self._runtime.config, before.glider) is not None
+                wanted = bool(self._runtime.fields) or layers
+                if (wanted and judgement.is_as_judged(flight, self._store)) or judgement.lacks_depth(
+                    flight, self._store, caches
+                ):
                     self._judge(flight, again=True)
 
     def _judge(self, path: Path, *, again: bool = False) -> None:
@@ -235,6 +247,7 @@ class Intake:
                     self._is_stopping,
                     ocean,
                     self._runtime.fields,
+                    layers_of(self._runtime.config, glider),
                 )
         except Quarantine as error:
             log.error("file cannot be assessed", path=file.path, glider=glider, exc_info=error.__cause__)
@@ -273,11 +286,13 @@ class Intake:
         if before is None or before.status != file.status:  # not once for each line that comes
             self._report(taken)
         else:
+            self._changed(file.glider)
             self.send(taken.alerts)
 
     def _report(self, outcome: transaction.FileOutcome, seconds: float | None = None) -> None:
         logs.taken(outcome)
         self._upkeep.took(outcome, seconds)
+        self._changed(outcome.file.glider)
         self.send(outcome.alerts)
         for advice in outcome.advice:
             try:
@@ -286,6 +301,20 @@ class Intake:
                 log.error("advice cannot be written", glider=advice.glider, reason=str(error))
             else:
                 log.info("advice written", glider=advice.glider, path=str(path))
+        self._write_yo(outcome)
+
+    def _write_yo(self, outcome: transaction.FileOutcome) -> None:
+        """Write the mission arguments of how deep to fly, where somebody wants them."""
+        glider = outcome.file.glider
+        layers = layers_of(self._runtime.config, glider)
+        if outcome.layers is None or layers is None or layers.outputs is None:
+            return
+        try:
+            paths = write_yo(glider, outcome.layers, layers.outputs)
+        except GliderwatchError as error:
+            log.error("advice cannot be written", glider=glider, reason=str(error))
+        else:
+            log.info("advice written", glider=glider, paths=[str(path) for path in paths])
 
     # --------------------------------------------------------------- messages
 
@@ -294,6 +323,8 @@ class Intake:
         logs.alerts(alerts)
         if alerts:
             self._wake.set()
+        for alert in alerts:
+            self._changed(alert.glider)
 
     def notify_all(self) -> None:
         """Say what an earlier life left unsaid of any glider."""

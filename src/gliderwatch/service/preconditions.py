@@ -84,6 +84,14 @@ def _place(config: Config) -> Iterator[Refusal]:
             yield Refusal(key, f"lies below the root {root}", "put it elsewhere")
 
 
+def _pages(config: Config) -> Iterator[Refusal]:
+    """The pages do not lie on the dockserver."""
+    if config.pages.folder is not None:
+        for root in expand(config.dockserver.roots):
+            if Path(config.pages.folder).is_relative_to(root):
+                yield Refusal("pages.folder", f"lies below the root {root}", "put it elsewhere")
+
+
 def _is_closed(path: Path) -> bool:
     return os.access(path, os.F_OK) and not os.access(path, os.W_OK)
 
@@ -130,4 +138,10 @@ def _lacks_credentials(template: str) -> bool:
     return secrets.needs_credentials(template) and secrets.CREDENTIALS not in os.environ
 
 
-PRECONDITIONS: tuple[Callable[[Config], Iterator[Refusal]], ...] = (_place, _content, _heartbeat, _secrets)
+PRECONDITIONS: tuple[Callable[[Config], Iterator[Refusal]], ...] = (
+    _place,
+    _pages,
+    _content,
+    _heartbeat,
+    _secrets,
+)

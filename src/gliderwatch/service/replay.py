@@ -27,6 +27,7 @@ from gliderwatch.service import judgement, transaction
 from gliderwatch.service.backlog import Job
 from gliderwatch.service.fields import FleetField, fields_of
 from gliderwatch.service.jsonl import alert_line, assessment_line, write_lines
+from gliderwatch.service.layers import layers_of, wants_science
 from gliderwatch.service.liveness import alive_path
 from gliderwatch.service.replay_order import Log, ReplayOrder, find_logs, read_logs
 from gliderwatch.service.routing import NOBODY, Routing, routing_of
@@ -217,7 +218,8 @@ def replay(
             _check_glider(request, jobs, calls, report.store)
             report.coming = _coming(jobs, calls)
             order = ReplayOrder(jobs)
-            for decoded in _decoded(jobs, [*cache_folders(request), lists.folder], workers, bool(fields)):
+            science = request.config is not None and wants_science(request.config)
+            for decoded in _decoded(jobs, [*cache_folders(request), lists.folder], workers, science):
                 for job, sent in order.after(decoded):
                     while calls and calls[0].sent <= sent:
                         _process_log(calls.popleft(), report, request, routing, on_file)
@@ -419,7 +421,15 @@ def _process(
             raise job.result if job.result is not None else Retry("was not decoded")
         ocean = None if report.ocean is None else report.ocean.field(glider)
         outcome = transaction.process_file(
-            report.store, job.file, job.result, params, routing, sent, ocean=ocean, fields=report.fields
+            report.store,
+            job.file,
+            job.result,
+            params,
+            routing,
+            sent,
+            ocean=ocean,
+            fields=report.fields,
+            layers=None if request.config is None else layers_of(request.config, glider),
         )
     except (Quarantine, Retry) as error:
         outcome = transaction.record_file(

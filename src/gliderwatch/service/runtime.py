@@ -21,6 +21,8 @@ from gliderwatch.model import Segment
 from gliderwatch.sea.ocean_field import Field
 from gliderwatch.service.backlog import Backlog, Job
 from gliderwatch.service.fields import FleetField, fields_of
+from gliderwatch.service.layers import wants_science
+from gliderwatch.service.page_writer import PagesWritten
 from gliderwatch.service.routing import Routing, routing_of
 from gliderwatch.slocum.caches import SensorLists, lists_folder
 from gliderwatch.slocum.decode import Decoder
@@ -94,7 +96,7 @@ class Decoded:
         return error if isinstance(error, Exception) else self.future.result()
 
 
-News = Change | Decoded | signal.Signals
+News = Change | Decoded | PagesWritten | signal.Signals
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,6 +192,6 @@ def build(
         fields_of(config),
         urls,
     )
-    decoder.science = bool(config.fields)
+    decoder.science = wants_science(config)
     decoder.cache_folders = parts.cache_folders()
     return parts

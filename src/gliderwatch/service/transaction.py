@@ -7,19 +7,25 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from gliderwatch.errors import GliderwatchError, NotAssessed
-from gliderwatch.incidents import aborts, irregularities, overdue, unjudged
+from gliderwatch.fleet.constants import CHECK_WINDOW
+from gliderwatch.fleet.cross_check import cross_check, current_of
+from gliderwatch.fleet.flow import DiveCurrent
+from gliderwatch.incidents import aborts, irregularities, neighbours, overdue, unjudged
 from gliderwatch.incidents import calls as without_files
 from gliderwatch.incidents.acknowledgement import with_mute
 from gliderwatch.incidents.constants import GONE
 from gliderwatch.incidents.notices import Fleet, Notice
 from gliderwatch.incidents.notifications import NotificationState, due_notifications
 from gliderwatch.incidents.send_schedule import AT_ONCE, Wait
+from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.messages.notice_text import render
 from gliderwatch.model import Alert, Assessment, Segment, SegmentId
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
 from gliderwatch.sea.ocean_field import Field
+from gliderwatch.service import layers as layers_of_sea
 from gliderwatch.service.fields import FieldAdvice, FleetField, look, take
+from gliderwatch.service.layers import GliderLayers
 from gliderwatch.service.routing import Routing, post_alerts, withdraw_answered
 from gliderwatch.slocum.calls import Dialog
 from gliderwatch.store.codec import plain_encode
@@ -29,13 +35,18 @@ from gliderwatch.store.state_file import File, Status, Store
 
 @dataclass(frozen=True, slots=True)
 class FileOutcome:
-    """What an input led to: what became of its file, the dives assessed anew, the messages made, and where to
-    look next."""
+    """What an input led to: what became of its file, the dives assessed anew, the messages made, where to
+    look next for fields, and how deep to fly to keep on layers."""
 
     file: File
     assessments: tuple[Assessment, ...] = ()
     alerts: tuple[Alert, ...] = ()
     advice: tuple[FieldAdvice, ...] = ()
+    layers: LayerAdvice | None = None
+
+
+LAST_ADVICE = 86400.0
+"""s: how deep to fly is not advised by what was measured longer before the last dive."""
 
 
 class StoppedError(GliderwatchError):
@@ -52,12 +63,14 @@ def process_file(
     stopping: Callable[[], bool] = lambda: False,
     ocean: Field | None = None,
     fields: Sequence[FleetField] = (),
+    layers: GliderLayers | None = None,
 ) -> FileOutcome:
     """Put a segment in its place and go on from the checkpoint before it; say what is to be said.
 
     A copy that holds no more than the one known is only noted. `speaking` is None while more files of the
     glider are at hand: then the last of them speaks for all. `now` (s) is when the file came; `ocean` is a
-    model's field, where dives are compared with one; `fields` are those that the gliders measure.
+    model's field, where dives are compared with one; `fields` are those that the gliders measure,
+    `layers` says what is to be done about layers of the sea.
     Raises Quarantine for a segment that cannot be assessed, StoppedError once `stopping` holds; then
     nothing has changed.
     """
@@ -71,12 +84,13 @@ def process_file(
             return FileOutcome(file, alerts=_due_messages(store, glider, params, speaking, now))
         file = replace(file, status=Status.TAKEN, reason="")
         store.note(file, now)
-        assessments, state = _run(store, segment, params, stopping, ocean)
+        assessments, state = _run(store, segment, params, stopping, ocean, layers)
         if fields:
             take(store, fields, store.segments.kept(segment.id))
         advice = look(store, fields, glider, state) if speaking is not None else ()
         alerts = _due_messages(store, glider, params, speaking, now)
-    return FileOutcome(file, assessments, alerts, advice)
+        deep = layers_of_sea.newest(store, glider) if layers is not None and speaking is not None else None
+    return FileOutcome(file, assessments, alerts, advice, deep)
 
 
 def record_file(
@@ -199,6 +213,7 @@ def _run(
     params: GliderParams,
     stopping: Callable[[], bool],
     ocean: Field | None,
+    layers: GliderLayers | None,
 ) -> tuple[tuple[Assessment, ...], GliderState]:
     segments = store.segments
     state, todo = segments.resume(segments.put(segment))
@@ -210,6 +225,8 @@ def _run(
         outcome = _process(state, one, params, ocean)
         store.apply(identity.glider, outcome)
         segments.checkpoint(identity, outcome.state)
+        if layers is not None:
+            layers_of_sea.take(store, identity, layers)
         state = outcome.state
         dives = {t: a for t, a in dives.items() if t < outcome.since} | {
             a.t_dive: a for a in outcome.assessments
@@ -237,6 +254,26 @@ def _speak_of_calls(
     return replace(said, aborts=episodes, empty=empty), [*notices, *more]
 
 
+def _compare(
+    store: Store, said: NotificationState, last: Assessment | None, params: GliderParams
+) -> tuple[NotificationState, list[Notice]]:
+    """What is to be said of a glider beside its neighbours: once for each surfacing, by what was measured
+    until then. Only a glider that is compared with its own currents (`reference: dac`) has them in its
+    assessments.
+    """
+    before = said.neighbours
+    if last is None or params.reference != "dac" or (before is not None and before.checked >= last.t_surface):
+        return said, []
+    currents = list[DiveCurrent]()
+    for glider in store.gliders():
+        dives = store.surfaced_between(glider, last.t_surface - CHECK_WINDOW, last.t_surface)
+        each = map(current_of, dives, [None, *dives])
+        currents += [current for current in each if current is not None]
+    check = cross_check(currents, last.glider)
+    compared, notices = neighbours.announce(last.glider, before, check, last.t_surface)
+    return replace(said, neighbours=compared), notices
+
+
 def _due_messages(
     store: Store, glider: str, params: GliderParams, speaking: Routing | None, now: float
 ) -> tuple[Alert, ...]:
@@ -257,12 +294,14 @@ def _due_messages(
         speaking.notices(glider),
         store.notes.acks(glider),
         tuple((field, each) for field, _, each in advice),
+        None if last is None else layers_of_sea.newest(store, glider, last.t_dive - LAST_ADVICE),
     )
     blind, of_watch = unjudged.announce(said.unknown, known, attention, params.rules.reminder_hours, now)
     ids, of_files = irregularities.due(before.irregularities, known.irregularities(now), now)
     said = replace(said, unknown=blind, irregularities=ids)
+    said, of_fleet = _compare(store, said, last, params)
     said, of_calls = _speak_of_calls(said, known, now)
-    alerts = tuple(map(render, (*heard, *of_files, *of_incidents, *of_watch, *of_calls)))
+    alerts = tuple(map(render, (*heard, *of_files, *of_incidents, *of_watch, *of_fleet, *of_calls)))
     if said != before or alerts:
         post_alerts(store, glider, said, alerts, _channels(store, before.silences, speaking), now)
     return alerts

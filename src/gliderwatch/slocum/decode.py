@@ -20,7 +20,7 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, InvalidStateError
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from math import prod
 from pathlib import Path
@@ -46,6 +46,7 @@ from gliderwatch.slocum.sensors import (
     TIME,
     Samples,
     build_segment,
+    cleaned,
     tells_depth,
 )
 
@@ -158,6 +159,21 @@ def decode(path: Path, cache_folders: Sequence[Path], *, science: bool = False) 
         raise Retry(f"cannot be read: {error}") from error
     completeness = (folders.rank(header.kind), n_cycles, digest.hexdigest())
     return build_segment(header, samples, completeness, content.damaged, science=science)
+
+
+def decode_science(path: Path, cache_folders: Sequence[Path], *, sensor: str | None = None) -> Segment:
+    """What the science file at `path` holds, without the flight file beside it: the quantities of
+    `sensors.SCIENCE`, and one `sensor` more, by its own name as it is sent. Raises as `decode`."""
+    wanted = SCIENCE_SENSORS if sensor is None or sensor in SCIENCE_SENSORS else (*SCIENCE_SENSORS, sensor)
+    try:
+        content = _content(path, cache_folders, _SCIENCE_TIME, wanted, science=True)
+    except OSError as error:
+        raise Retry(f"cannot be read: {error}") from error
+    completeness = (folders.rank(content.header.kind), content.n_cycles, content.digest.hexdigest())
+    segment = build_segment(content.header, content.samples, completeness, content.damaged, science=True)
+    if sensor is None or sensor not in content.samples:
+        return segment
+    return replace(segment, quantities={**segment.quantities, sensor: cleaned(content.samples[sensor])})
 
 
 @dataclass(frozen=True, slots=True)

@@ -198,6 +198,14 @@ def build_segment(
     )
 
 
+def cleaned(samples: tuple[Array, Array]) -> Series:
+    """The finite samples of any sensor, one for each time, in order; its values as the glider sent them."""
+    t, v = samples
+    good = np.isfinite(t) & np.isfinite(v)
+    times, first = np.unique(t[good], return_index=True)
+    return Series(readonly(times), readonly(v[good][first]))
+
+
 def _with_depth(samples: Samples) -> Samples:
     """The samples; with the depth that the pressure says where there is none."""
     t, bar = next((samples[name] for name in PRESSURES if _holds(samples, name)), (None, None))

@@ -91,6 +91,26 @@ def one_sea(state: Any) -> Any:
     return state
 
 
+def one_level(state: Any) -> Any:
+    """Layout 3 to 4: the estimate is one level, and its parts are called what they are.
+
+    That a fix ended the last dive is remembered once, by the forecast.
+    """
+    state["changed"] = state.pop("told", [])
+    for memory in (state["settled"], state["memory"]):
+        memory["rules"] = memory.pop("watches", {})
+        estimate = memory.setdefault("estimate", {})
+        estimate.pop("end", None)
+        joint = estimate.pop("joint", {})
+        estimate |= joint
+        speed = estimate.get("speed", {})
+        if (kept := speed.pop("joint", None)) is not None:
+            kept.pop("nis", None), kept.pop("dof", None)
+            names = {"sea": "process_scale", "doubt": "measurement_scale"}
+            speed["filter"] = {names.get(name, name): value for name, value in kept.items()}
+    return state
+
+
 def _array(written: Mapping[str, Any]) -> Array:
     """An array as a record holds it."""
     return np.frombuffer(base64.b64decode(written["f64"]), dtype="<f8").reshape(written["shape"])
@@ -107,7 +127,10 @@ def same(segment: Any) -> Any:
     return segment
 
 
-CONVERTERS: Mapping[type, tuple[Converter, ...]] = {GliderState: (typed_dives, one_sea), Segment: (same,)}
+CONVERTERS: Mapping[type, tuple[Converter, ...]] = {
+    GliderState: (typed_dives, one_sea, one_level),
+    Segment: (same,),
+}
 """For each kind of record the way from layout 1 to today's: the n-th leads from layout n to n + 1. What is in
 it stays in it, for records of every layout are in use somewhere."""
 

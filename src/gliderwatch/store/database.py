@@ -125,7 +125,7 @@ __all__ = [
     "schema",
 ]
 
-SCHEMA = 8
+SCHEMA = 9
 DELIVERY_BY_WORDS = """CASE
     WHEN delivered_at IS NULL THEN 'pending' WHEN error = '' THEN 'delivered'
     WHEN error LIKE 'withdrawn: %' THEN 'withdrawn' WHEN error LIKE 'given up: %' THEN 'unreadable'
@@ -281,6 +281,16 @@ CREATE TABLE field_advice (       -- where each glider should look next: `fleet.
     t      REAL NOT NULL,         -- the surfacing
     data   TEXT NOT NULL,
     PRIMARY KEY (field, glider)
+) STRICT;
+""",
+    9: """
+CREATE TABLE layers (             -- layers of the sea after each segment, and the advice that followed
+    glider    TEXT NOT NULL,
+    opened_at REAL NOT NULL,
+    segment   TEXT NOT NULL,
+    t         REAL NOT NULL,      -- of the advice
+    data      TEXT NOT NULL,      -- `layers.advice.Layered`
+    PRIMARY KEY (glider, opened_at, segment)
 ) STRICT;
 """,
 }

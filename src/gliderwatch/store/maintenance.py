@@ -128,7 +128,7 @@ def _sync(path: Path) -> None:
 # ----------------------------------------
 # Putting what was assessed anew of one glider in place of what a state file holds of it.
 
-_TABLES = ("segments", "assessments", "incidents", "expected")
+_TABLES = ("segments", "assessments", "incidents", "expected", "layers")
 
 
 def paths(db: sqlite3.Connection, glider: str) -> list[str]:
@@ -160,8 +160,9 @@ def seed(old: sqlite3.Connection, new: sqlite3.Connection, glider: str) -> None:
     for table, column in (("assessments", "t_dive"), ("incidents", "opened_at")):
         sql = f"SELECT * FROM {table} WHERE glider = ? AND {column} <= ?"
         _insert(new, table, old.execute(sql, (glider, until)).fetchall())
-    sql = "SELECT * FROM expected WHERE glider = ? AND opened_at = ? AND segment = ?"
-    _insert(new, "expected", old.execute(sql, (glider, row["opened_at"], row["name"])).fetchall())
+    for table in ("expected", "layers"):
+        sql = f"SELECT * FROM {table} WHERE glider = ? AND opened_at = ? AND segment = ?"
+        _insert(new, table, old.execute(sql, (glider, row["opened_at"], row["name"])).fetchall())
 
 
 def _insert(db: sqlite3.Connection, table: str, rows: list[sqlite3.Row]) -> None:

@@ -11,6 +11,7 @@ from gliderwatch.incidents.irregularities import PLACES, Coming, found
 from gliderwatch.incidents.notices import Irregularity, Unjudged
 from gliderwatch.incidents.overdue import Sign
 from gliderwatch.model import (
+    Alert,
     Assessment,
     Call,
     Fix,
@@ -98,6 +99,27 @@ class GliderFacts:
         """The dive that began at a time (s)."""
         sql = "SELECT data FROM assessments WHERE glider = ? AND t_dive = ?"
         return next(iter(values(self._db, sql, (self.glider, t_dive), Assessment)), None)
+
+    def latest_dives(self, n: int) -> tuple[Assessment, ...]:
+        """The last `n` dives that have ended, in order of time."""
+        sql = (
+            "SELECT data FROM assessments WHERE glider = ? AND ended = 1 "
+            "ORDER BY t_surface DESC, t_dive DESC LIMIT ?"
+        )
+        return tuple(reversed(values(self._db, sql, (self.glider, n), Assessment)))
+
+    def latest_alerts(self, n: int) -> tuple[Alert, ...]:
+        """The last `n` messages about it, the newest first."""
+        sql = "SELECT data FROM alerts WHERE glider = ? ORDER BY made_at DESC, rowid DESC LIMIT ?"
+        return tuple(values(self._db, sql, (self.glider, n), Alert))
+
+    def last_log(self) -> str | None:
+        """The path of the log of its last call; None where there is none, or no such table yet."""
+        if not self._db.execute("SELECT 1 FROM sqlite_schema WHERE name = 'calls'").fetchone():
+            return None
+        sql = "SELECT path FROM calls WHERE glider = ? ORDER BY last_t DESC LIMIT 1"
+        row = self._db.execute(sql, (self.glider,)).fetchone()
+        return None if row is None else str(row[0])
 
     def last_surfacing(self, until: float) -> Assessment | None:
         """The last dive whose end is known and not after `until` (s)."""

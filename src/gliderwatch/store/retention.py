@@ -141,6 +141,7 @@ def _results(db: sqlite3.Connection, transaction: Transaction, glider: str) -> I
         ("heard", "glider = ? AND opened_at < ?", (glider, opened_at)),
         ("calls", "glider = ? AND last_t < ?", (glider, opened_at)),
         ("expected", "glider = ? AND after < ? AND opened_at < ?", (glider, opened_at, opened_at)),
+        ("layers", "glider = ? AND opened_at < ?", (glider, opened_at)),
     ):
         yield from _by_and_by(db, transaction, table, where, values)
     yield from _messages(db, transaction, glider, until, kept)

@@ -126,7 +126,8 @@ def _move(db: sqlite3.Connection, before: SegmentId, after: SegmentId, correctio
         "clock_offset = ?1 WHERE glider = ?2 AND segment = ?3 AND abs(opened_at - ?4) <= ?5",
         (correction.offset, before.glider, before.name, before.opened_at, SAME_OPENING),
     )
-    db.execute("DELETE FROM expected WHERE glider = ? AND opened_at = ? AND segment = ?", key)
+    for table in ("expected", "layers"):
+        db.execute(f"DELETE FROM {table} WHERE glider = ? AND opened_at = ? AND segment = ?", key)
 
 
 def steps(db: sqlite3.Connection, glider: str) -> list[ClockStep]:
@@ -270,7 +271,8 @@ class Segments:
     def _forget(self, identity: SegmentId) -> None:
         key = (identity.glider, identity.opened_at, identity.name)
         self._db.execute("DELETE FROM segments WHERE glider = ? AND opened_at = ? AND name = ?", key)
-        self._db.execute("DELETE FROM expected WHERE glider = ? AND opened_at = ? AND segment = ?", key)
+        for table in ("expected", "layers"):
+            self._db.execute(f"DELETE FROM {table} WHERE glider = ? AND opened_at = ? AND segment = ?", key)
 
     def resume(self, first: SegmentId) -> tuple[GliderState, list[SegmentId]]:
         """The newest state before a segment, and the ids of all segments after it, in order of time."""

@@ -23,6 +23,7 @@ from gliderwatch.store import codec, outbox, retention, segments
 from gliderwatch.store.codec import File, Status, Undelivered, file_of, values
 from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, read_only
 from gliderwatch.store.fields import Fields
+from gliderwatch.store.layers import LayerRows
 from gliderwatch.store.results import Annotations, Calls, GliderFacts
 from gliderwatch.store.segments import RECENT, Segments
 
@@ -47,6 +48,7 @@ class Store:
         self._db, self._path = connection, path
         self.segments, self.notes = Segments(connection), Annotations(connection)
         self.calls, self.fields = Calls(connection), Fields(connection)
+        self.layers = LayerRows(connection)
 
     @classmethod
     def open(cls, path: Path | str, *, durable: bool = True) -> Store:
@@ -195,6 +197,14 @@ class Store:
         return values(
             self._db, "SELECT data FROM assessments WHERE glider = ? ORDER BY t_dive", (glider,), Assessment
         )
+
+    def surfaced_between(self, glider: str, start: float, end: float) -> list[Assessment]:
+        """Those of a glider that ended between two times (s) with a fix, in order of time."""
+        sql = (
+            "SELECT data FROM assessments WHERE glider = ? AND ended = 1 AND t_surface BETWEEN ? AND ? "
+            "ORDER BY t_surface"
+        )
+        return values(self._db, sql, (glider, start, end), Assessment)
 
     def incidents(self, glider: str) -> list[Incident]:
         """All of a glider, in order of time."""

@@ -1,0 +1,185 @@
+"""`gliderwatch export` and `where`: what is known of gliders, for other programs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from gliderwatch.cli.options import DEFAULT, FILE, configured, example, json_option
+from gliderwatch.errors import GliderwatchError
+
+# ruff: noqa: PLC0415
+# What a command needs is imported in it: `status` in a health check must not wait for what this needs.
+
+if TYPE_CHECKING:
+    from gliderwatch.config import Config
+    from gliderwatch.pages.view import GliderView
+    from gliderwatch.store.state_file import Store
+
+_ALL = 1_000_000
+only_config_option = click.option("-c", "--config", "config_path", type=FILE, help="The YAML configuration.")
+state_option = click.option(
+    "--state", type=FILE, help="A state file, as a replay leaves; else the service's."
+)
+at_option = click.option(
+    "--at", help="As of this time (UTC); else now, or an hour after the last dive of a --state."
+)
+
+
+@contextmanager
+def looking(
+    config_path: Path | None, state: Path | None, at: str | None
+) -> Iterator[tuple[Config | None, Store, float]]:
+    """The configuration, where one is named or needed; the state file, for looking; and as of when (s).
+
+    Raises GliderwatchError where one of them cannot be had.
+    """
+    from gliderwatch.config import load
+    from gliderwatch.config.fields import moment
+    from gliderwatch.pages import reading
+    from gliderwatch.store.state_file import Store
+
+    config = None
+    if state is None or config_path is not None:
+        config = load(configured(config_path or DEFAULT))
+    store = Store.reading(state or Path(config.state.path if config is not None else ""))
+    try:
+        with store.guarded():
+            now = time.time()
+            if at is not None:
+                try:
+                    now = moment(at)
+                except ValueError as error:
+                    raise GliderwatchError(f"--at {error}") from None
+            elif state is not None:
+                now = min(now, (reading.last_news(store) or now) + 3600.0)
+            yield config, store, now
+    finally:
+        store.close()
+
+
+@contextmanager
+def viewing(
+    config_path: Path | None, state: Path | None, at: str | None, glider: str | None
+) -> Iterator[tuple[GliderView, ...]]:
+    """What is known of one glider or of all. Raises GliderwatchError where nothing is."""
+    from gliderwatch.pages import reading
+    from gliderwatch.params import Attention
+
+    with looking(config_path, state, at) as (config, store, now):
+        names = store.gliders()
+        if glider is not None and glider.lower() not in names:
+            raise GliderwatchError(
+                f"nothing is known of a glider {glider}; known are: {', '.join(names) or 'none'}"
+            )
+        wanted = names if glider is None else [glider.lower()]
+        attention = config.attention if config is not None else lambda _name: Attention()
+        yield tuple(
+            reading.read_glider(store, name, attention(name), now, dives=_ALL, whole=False) for name in wanted
+        )
+
+
+@click.command(
+    epilog=example(
+        "gliderwatch export electa --format netcdf --out electa.nc", "gliderwatch export --format kml"
+    )
+)
+@click.argument("glider", required=False)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["geojson", "kml", "csv", "netcdf"]),
+    required=True,
+    help="The format.",
+)
+@click.option("--out", type=FILE, help="The file; else it is printed.")
+@only_config_option
+@state_option
+@at_option
+def export(
+    glider: str | None,
+    form: str,
+    out: Path | None,
+    config_path: Path | None,
+    state: Path | None,
+    at: str | None,
+) -> None:
+    """Write tracks, dives, and where gliders are and come up next, for other programs.
+
+    netcdf: one glider, one row a dive, by CF and ACDD. csv: one row a dive. geojson, kml: for maps.
+    """
+    from gliderwatch.export import dives, maps, netcdf
+
+    with viewing(config_path, state, at, glider) as views:
+        if form == "netcdf":
+            if out is None or len(views) != 1:
+                raise click.UsageError("netcdf is of one glider, into a file: name the GLIDER and --out FILE")
+            netcdf.write(out, views[0].name, views[0].dives, views[0].now)
+            return
+        if form == "csv":
+            text = dives.as_csv([dive for view in views for dive in view.dives])
+        else:
+            text = maps.as_geojson(views) if form == "geojson" else maps.as_kml(views)
+    if out is None:
+        click.echo(text, nl=not text.endswith("\n"))
+    else:
+        out.write_text(text, encoding="utf-8")
+
+
+@click.command(epilog=example("gliderwatch where electa", "gliderwatch where electa --ais 992441234"))
+@click.argument("glider", required=False)
+@json_option
+@click.option("--ais", type=int, help="As a virtual aid to navigation of this number (MMSI): NMEA lines.")
+@only_config_option
+@state_option
+@at_option
+def where(
+    glider: str | None,
+    as_json: bool,
+    ais: int | None,
+    config_path: Path | None,
+    state: Path | None,
+    at: str | None,
+) -> None:
+    """Tell where gliders are now, also under water, and how sure that is."""
+    import msgspec
+
+    from gliderwatch.export import ais as virtual
+    from gliderwatch.export.dives import iso
+    from gliderwatch.messages.formatting import clean, place
+
+    if ais is not None and glider is None:
+        raise click.UsageError("--ais is of one glider: name it")
+    with viewing(config_path, state, at, glider) as views:
+        found = [(view, view.whereabouts()) for view in views]
+    if as_json:
+        listed = [
+            {
+                "glider": view.name,
+                "t": iso(view.now),
+                "lat": area.lat if area else None,
+                "lon": area.lon if area else None,
+                "major_m": area.major if area else None,
+                "minor_m": area.minor if area else None,
+                "bearing": area.bearing if area else None,
+            }
+            for view, area in found
+        ]
+        click.echo(msgspec.json.format(msgspec.json.encode(listed), indent=2))
+        return
+    for view, area in found:
+        if area is None:
+            click.echo(f"{clean(view.name)}: no position is known")
+        elif ais is not None:
+            click.echo("\n".join(virtual.lines(view.name, area, ais, view.now)))
+        else:
+            size = f"{area.major / 1000:.1f} x {area.minor / 1000:.1f} km, long axis {area.bearing:03.0f}°"
+            click.echo(f"{clean(view.name)}: {place(area.lat, area.lon)}, 95 % within {size}")
+
+
+COMMANDS = (export, where)

@@ -1,0 +1,1 @@
+"""What is known of gliders for other programs: GeoJSON, KML, NetCDF, CSV, virtual AIS."""

@@ -1,0 +1,93 @@
+"""The dives of a glider as columns: what a table and a NetCDF file have in common. Pure."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from gliderwatch.messages.formatting import clean
+from gliderwatch.model import Assessment
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One quantity of a dive: its ``name`` and ``unit`` (UDUNITS) as in docs/nomenclature.md, what it is in
+    words, its CF standard name, if there is one, and how it is found."""
+
+    name: str
+    unit: str
+    long_name: str
+    value: Callable[[Assessment], float | None]
+    standard_name: str = ""
+
+
+def _evidence(key: str) -> Callable[[Assessment], float | None]:
+    return lambda dive: dive.evidence.get(key)
+
+
+COLUMNS = (
+    Column("t_dive", "seconds since 1970-01-01T00:00:00Z", "first sample under water", lambda d: d.t_dive),
+    Column(
+        "speed",
+        "m s-1",
+        "horizontal speed through the water",
+        lambda d: d.speed,
+        "platform_speed_wrt_sea_water",
+    ),
+    Column("speed_sigma", "m s-1", "standard error of the speed", _evidence("speed_sigma")),
+    Column("speed_min", "m s-1", "lower bound of the normal speed", lambda d: d.speed_min),
+    Column("speed_max", "m s-1", "upper bound of the normal speed", lambda d: d.speed_max),
+    Column("own_speed", "m s-1", "speed that the glider itself reckons with", _evidence("own_speed")),
+    Column("flow_u", "m s-1", "estimated current, east", lambda d: d.flow_u, "eastward_sea_water_velocity"),
+    Column("flow_v", "m s-1", "estimated current, north", lambda d: d.flow_v, "northward_sea_water_velocity"),
+    Column("flow_sigma", "m s-1", "standard error of a component of the current", _evidence("flow_sigma")),
+    Column("reference_u", "m s-1", "current it is compared with, east", lambda d: d.reference_u),
+    Column("reference_v", "m s-1", "current it is compared with, north", lambda d: d.reference_v),
+    Column("p_e", "1", "difference of the two currents, 0 to 1", lambda d: d.p_e),
+    Column("across_misfit", "m s-1", "misfit across the heading", _evidence("across_misfit")),
+    Column("depth_max", "m", "greatest depth of the dive", _evidence("depth_max")),
+    Column("pitch_dive", "rad", "mean pitch going down", _evidence("pitch_dive"), "platform_pitch_fore_up"),
+    Column("pitch_climb", "rad", "mean pitch coming up", _evidence("pitch_climb"), "platform_pitch_fore_up"),
+    Column(
+        "roll_mean",
+        "rad",
+        "mean roll, right side down positive",
+        _evidence("roll_mean"),
+        "platform_roll_starboard_down",
+    ),
+)
+"""What is written of each dive beside time, place and flag."""
+
+
+def as_csv(dives: Sequence[Assessment]) -> str:
+    """A table, one dive a line: times as ISO 8601, what is unknown left empty."""
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    names = [column.name for column in COLUMNS if column.name != "t_dive"]
+    table.writerow(["glider", "segment", "t_dive", "t_surface", "lat", "lon", "flag", *names, "reason"])
+    for d in dives:
+        numbers = [column.value(d) for column in COLUMNS if column.name != "t_dive"]
+        times = (iso(d.t_dive), iso(d.t_surface))
+        where = ("" if d.lat is None else d.lat, "" if d.lon is None else d.lon)
+        flag = "" if d.flag is None else d.flag
+        values = ["" if x is None else f"{x:.6g}" for x in numbers]
+        table.writerow([_text(d.glider), _text(d.segment), *times, *where, flag, *values, _text(d.reason)])
+    return out.getvalue()
+
+
+def _text(value: str) -> str:
+    """Text for a cell: a spreadsheet runs what begins as a formula does."""
+    line = clean(value)
+    return f"'{line}" if line.startswith(("=", "+", "-", "@")) else line
+
+
+def iso(t: float) -> str:
+    """A time (s) as ISO 8601, to the second.
+
+    >>> iso(1667696205.25)
+    '2022-11-06T00:56:45Z'
+    """
+    return datetime.fromtimestamp(t, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

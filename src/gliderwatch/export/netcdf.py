@@ -1,0 +1,150 @@
+"""Dives as a NetCDF trajectory by the conventions CF 1.8 and ACDD 1.3: one row a dive."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+
+from gliderwatch import __version__
+from gliderwatch.errors import GliderwatchError
+from gliderwatch.export.dives import COLUMNS, Column, iso
+from gliderwatch.messages.formatting import clean
+from gliderwatch.model import Array, Assessment
+
+FLAGS = {-127: "no_judgement", 0: "normal", 1: "speed_out_of_range", 2: "measurements_disagree"}
+SINCE = "seconds since 1970-01-01T00:00:00Z"
+_FILL = -9999.0
+_Value = Callable[[Assessment], float | None]
+_AXES: tuple[tuple[str, str, str, str, str, _Value], ...] = (
+    ("time", "T", "time", "surfacing that ended the dive", SINCE, lambda d: d.t_surface),
+    ("lat", "Y", "latitude", "latitude of the fix after it", "degrees_north", lambda d: d.lat),
+    ("lon", "X", "longitude", "longitude of the fix after it", "degrees_east", lambda d: d.lon),
+)
+
+
+def write(path: Path, glider: str, dives: Sequence[Assessment], now: float) -> None:
+    """Write the dives of a glider whose place is known, in order of time; made at `now` (s).
+
+    Raises GliderwatchError where there is none, or the file cannot be written.
+    """
+    placed = [d for d in dives if d.lat is not None and d.lon is not None]
+    if not placed:
+        raise GliderwatchError(
+            f"{clean(glider)} has no dive with a position: there is no trajectory to write"
+        )
+    try:
+        with netCDF4.Dataset(path, "w", format="NETCDF4_CLASSIC") as data:
+            _coordinates(data, clean(glider), placed)
+            _flags(data, placed)
+            for column in COLUMNS:
+                _column(data, column, placed)
+            data.setncatts(_about(clean(glider), placed, now))
+    except (OSError, RuntimeError) as error:
+        raise GliderwatchError(f"{path} cannot be written: {error}") from None
+
+
+def _coordinates(data: netCDF4.Dataset, glider: str, dives: Sequence[Assessment]) -> None:
+    name = glider.encode() or b"unknown"
+    data.createDimension("obs", len(dives))
+    data.createDimension("name_strlen", len(name))
+    trajectory = data.createVariable("trajectory", "S1", ("name_strlen",))
+    trajectory.setncatts({"long_name": "name of the glider", "cf_role": "trajectory_id"})
+    trajectory[:] = np.frombuffer(name, dtype="S1")
+    crs = data.createVariable("crs", "i4")
+    crs.setncatts(
+        {
+            "grid_mapping_name": "latitude_longitude",
+            "long_name": "WGS 84",
+            "semi_major_axis": 6378137.0,
+            "inverse_flattening": 298.257223563,
+            "epsg_code": "EPSG:4326",
+        }
+    )
+    crs[...] = 0
+    for short, axis, standard, long_name, unit, value in _AXES:
+        attributes = {"standard_name": standard, "long_name": long_name, "units": unit, "axis": axis}
+        attributes |= {"coverage_content_type": "coordinate"}
+        attributes |= {"calendar": "standard"} if short == "time" else {}
+        _variable(data, short, _values(dives, value), attributes, fill=False)
+
+
+def _column(data: netCDF4.Dataset, column: Column, dives: Sequence[Assessment]) -> None:
+    attributes = {"units": column.unit, "long_name": column.long_name}
+    if column.standard_name:
+        attributes["standard_name"] = column.standard_name
+    if column.unit.startswith("seconds since"):
+        attributes |= {"calendar": "standard", "coverage_content_type": "coordinate"}
+    else:
+        attributes |= {"coordinates": "time lat lon", "coverage_content_type": "modelResult"}
+    _variable(data, column.name, _values(dives, column.value), attributes)
+
+
+def _flags(data: netCDF4.Dataset, dives: Sequence[Assessment]) -> None:
+    variable = data.createVariable("flag", "i1", ("obs",))
+    variable.setncatts(
+        {
+            "long_name": "flag of the dive",
+            "standard_name": "quality_flag",
+            "flag_values": np.array(list(FLAGS), dtype="i1"),
+            "flag_meanings": " ".join(FLAGS.values()),
+            "coordinates": "time lat lon",
+            "coverage_content_type": "qualityInformation",
+        }
+    )
+    variable[:] = np.array([-127 if d.flag is None else int(d.flag) for d in dives], dtype="i1")
+
+
+def _variable(
+    data: netCDF4.Dataset, name: str, values: Array, attributes: dict[str, str], *, fill: bool = True
+) -> None:
+    variable = data.createVariable(name, "f8", ("obs",), fill_value=_FILL if fill else None)
+    variable.setncatts(attributes)
+    if fill:
+        variable.setncattr("grid_mapping", "crs")
+    variable[:] = np.where(np.isfinite(values), values, _FILL)
+
+
+def _values(dives: Sequence[Assessment], value: _Value) -> Array:
+    return np.array([np.nan if (x := value(d)) is None else x for d in dives], dtype=float)
+
+
+def _about(glider: str, dives: Sequence[Assessment], now: float) -> dict[str, object]:
+    """The global attributes."""
+    lat, lon = _values(dives, lambda d: d.lat), _values(dives, lambda d: d.lon)
+    t = _values(dives, lambda d: d.t_surface)
+    made = datetime.fromtimestamp(now, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    return {
+        "Conventions": "CF-1.8, ACDD-1.3",
+        "featureType": "trajectory",
+        "title": f"Speed through the water and current of the underwater glider {glider}",
+        "summary": "One row a dive of a Slocum glider: its speed through the water and the mean current as "
+        "estimated from satellite fixes, headings and the current that the glider reckons, with standard "
+        "errors, and a flag that says whether the speed is out of its normal range.",
+        "keywords": "EARTH SCIENCE > OCEANS > OCEAN CIRCULATION > OCEAN CURRENTS",
+        "keywords_vocabulary": "GCMD Science Keywords",
+        "id": f"gliderwatch-{glider}-{iso(float(t[0]))[:10]}",
+        "naming_authority": "gliderwatch",
+        "source": "underwater glider",
+        "processing_level": "estimated from real-time data, flagged automatically",
+        "history": f"{made} written by gliderwatch {__version__}",
+        "comment": "flag -127: the dive could not be judged",
+        "standard_name_vocabulary": "CF Standard Name Table v93",
+        "date_created": made,
+        "date_modified": made,
+        "creator_name": "gliderwatch",
+        "geospatial_lat_min": float(lat.min()),
+        "geospatial_lat_max": float(lat.max()),
+        "geospatial_lat_units": "degrees_north",
+        "geospatial_lon_min": float(lon.min()),
+        "geospatial_lon_max": float(lon.max()),
+        "geospatial_lon_units": "degrees_east",
+        "geospatial_bounds_crs": "EPSG:4326",
+        "time_coverage_start": iso(float(t[0])),
+        "time_coverage_end": iso(float(t[-1])),
+        "time_coverage_duration": f"PT{round(float(t[-1] - t[0]))}S",
+        "time_coverage_resolution": f"PT{round(float(np.median(np.diff(t)))) if len(t) > 1 else 0}S",
+    }

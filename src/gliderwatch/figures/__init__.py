@@ -1,0 +1,1 @@
+"""Pictures: maps and plots, made on this machine, for pages, mails and reports."""

@@ -1,0 +1,63 @@
+"""Pages as files for any web server: each is whole at every moment, whatever stops who writes it."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+
+from gliderwatch.errors import GliderwatchError
+from gliderwatch.figures.coast import world
+from gliderwatch.pages.reading import read_fleet
+from gliderwatch.pages.render import Frame, file_of, fleet_page, glider_page, sheet_page
+from gliderwatch.pages.view import GliderView
+from gliderwatch.params import Attention
+from gliderwatch.store.state_file import Store
+
+FLEET = "index.html"
+FLEET_DUE, GLIDER_DUE = 900.0, 5400.0
+"""Seconds after which a page counts as stale: half as long again as it takes until the next one."""
+LEFT_OVER = 3600.0
+"""Seconds after which what a killed writer left is removed."""
+
+
+def write_fleet(store: Store, folder: Path, attention: dict[str, Attention], now: float) -> None:
+    """Write the page of all gliders, those of `attention`. Raises GliderwatchError where that cannot be."""
+    views = read_fleet(store, sorted(attention), lambda name: attention[name], now)
+    put(folder / FLEET, fleet_page(views, Frame(now, now + FLEET_DUE), world()))
+
+
+def write_glider(view: GliderView, folder: Path) -> None:
+    """Write the pages of one glider. Raises GliderwatchError where that cannot be."""
+    frame = Frame(view.now, view.now + GLIDER_DUE)
+    put(folder / file_of(view.name), glider_page(view, frame, world()))
+    put(folder / file_of(view.name, "-sheet"), sheet_page(view, frame, world()))
+
+
+def put(path: Path, text: str) -> None:
+    """Put a file in the place of an earlier one, for all to read: a reader sees the one or the other, whole.
+
+    Raises GliderwatchError where it cannot be written.
+    """
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with part.open("w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        part.chmod(0o644)
+        part.replace(path)
+    except OSError as error:
+        raise GliderwatchError(
+            f"page {path} cannot be written: {error.strerror}. What to do: let the user of the service write "
+            "to the folder, or name another in pages.folder"
+        ) from None
+
+
+def clear(folder: Path, now: float | None = None) -> None:
+    """Remove what a writer left that was killed long ago."""
+    before = (time.time() if now is None else now) - LEFT_OVER
+    for part in folder.glob(".*.part"):
+        if part.stat().st_mtime < before:
+            part.unlink(missing_ok=True)

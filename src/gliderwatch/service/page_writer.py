@@ -1,0 +1,183 @@
+"""Pages are written by a process of its own: drawing can be slow, hang or die, and no alert waits for it."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import structlog
+from pebble import ProcessPool
+
+from gliderwatch.config import Config
+from gliderwatch.params import Attention
+
+if TYPE_CHECKING:
+    from gliderwatch.store.state_file import Store
+
+log = structlog.get_logger(__name__)
+
+LIMIT = 60.0
+"""Seconds that the pages of one glider, or the one of all, may take: usually below one."""
+FLEET_EVERY, GLIDER_EVERY = 600.0, 3600.0
+"""Seconds after which a page is written anew without any news: countdowns, and where a glider drifts."""
+_NICENESS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class PageJob:
+    """What is to be written: the pages of a ``glider``, or, where that is empty, the one of all."""
+
+    state: Path
+    folder: Path
+    attention: dict[str, Attention] = field(default_factory=dict)
+    glider: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PagesWritten:
+    """News for the daemon: what was begun is done, or was given up."""
+
+
+def write(job: PageJob) -> None:
+    """Write the pages of a job, and what lies beside them for other programs. Raises GliderwatchError."""
+    from gliderwatch.store.state_file import Store
+
+    store, now = Store.reading(job.state), time.time()
+    try:
+        with store.guarded():
+            if job.glider:
+                write_glider(store, job.folder, job.glider, job.attention[job.glider], now)
+            else:
+                write_fleet(store, job.folder, job.attention, now)
+    finally:
+        store.close()
+
+
+# ruff: noqa: PLC0415
+# Nothing that draws is loaded in the daemon, which imports this module too.
+
+
+def write_fleet(store: Store, folder: Path, attention: dict[str, Attention], now: float) -> None:
+    """Write what is of all gliders, those of `attention`, as known at `now` (s). Raises GliderwatchError."""
+    from gliderwatch.export import maps
+    from gliderwatch.pages import render, writing
+
+    writing.clear(folder, now)
+    writing.write_fleet(store, folder, attention, now)
+    links = [render.file_of(name, ending="kml") for name in store.gliders()]
+    writing.put(folder / "gliders.kml", maps.as_kml_link(links))
+
+
+def write_glider(store: Store, folder: Path, name: str, attention: Attention, now: float) -> None:
+    """Write what is of one glider, as known at `now` (s). Raises GliderwatchError."""
+    from gliderwatch.export import maps
+    from gliderwatch.pages import reading, render, writing
+
+    view = reading.read_glider(store, name, attention, now)
+    writing.write_glider(view, folder)
+    writing.put(folder / render.file_of(name, ending="geojson"), maps.as_geojson((view,)))
+    writing.put(folder / render.file_of(name, ending="kml"), maps.as_kml((view,)))
+
+
+class PageWriter:
+    """Has the pages written that are out of date, one at a time. Used in the daemon's thread.
+
+    `news` gets a `PagesWritten` whenever the next can be begun. `write` is what the process does, `limit` the
+    seconds after which it is ended.
+    """
+
+    def __init__(
+        self,
+        news: Callable[[PagesWritten], None],
+        write: Callable[[PageJob], None] = write,
+        limit: float = LIMIT,
+    ) -> None:
+        self._news, self._write, self._limit = news, write, limit
+        self._config: Config | None = None
+        self._pool: ProcessPool | None = None
+        self._job: Future[None] | None = None
+        self._waiting: dict[str, None] = {}
+        self._written: dict[str, float] = {}
+
+    def use(self, config: Config) -> None:
+        """Go by these settings; all pages are written once."""
+        self._config = config
+        self._waiting, self._written = {}, {}
+
+    def changed(self, glider: str) -> None:
+        """There is news of a glider (empty: of none that is known): its pages, and that of all, are out of
+        date."""
+        self._waiting |= {"": None, glider: None}
+
+    def turn(self, gliders: list[str], monotonic: float) -> None:
+        """Begin to write what is out of date, if nothing is being written; `gliders` have a file by now."""
+        config = self._config
+        if config is None or config.pages.folder is None or (self._job is not None and not self._job.done()):
+            return
+        names = sorted({*config.gliders, *gliders})
+        for name, every in (("", FLEET_EVERY), *((glider, GLIDER_EVERY) for glider in gliders)):
+            if monotonic - self._written.get(name, float("-inf")) >= every:
+                self._waiting.setdefault(name)
+        if not self._waiting:
+            return
+        name = "" if "" in self._waiting else next(iter(self._waiting))
+        del self._waiting[name]
+        self._written[name] = monotonic
+        if not name or name in gliders:
+            attention = {each: config.attention(each) for each in ([name] if name else names)}
+            self._begin(PageJob(Path(config.state.path), Path(config.pages.folder), attention, name))
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether nothing is being written, nor waits to be."""
+        return not self._waiting and (self._job is None or self._job.done())
+
+    def stop(self) -> None:
+        """End the process at once: the pages that are there are whole."""
+        if self._pool is not None:
+            self._pool.stop()  # type: ignore[no-untyped-call]
+            self._pool.join()
+            self._pool = None
+
+    def _begin(self, job: PageJob) -> None:
+        for _ in range(2):
+            if self._pool is None:
+                self._pool = ProcessPool(
+                    max_workers=1,
+                    initializer=_prepare,
+                    initargs=(str(job.state.parent / "matplotlib"),),
+                    context=multiprocessing.get_context("spawn"),
+                )
+            try:
+                self._job = self._pool.schedule(self._write, args=(job,), timeout=self._limit)
+            except RuntimeError:  # the pool gives up for good when a process dies that has nothing to do
+                self.stop()
+            else:
+                self._job.add_done_callback(partial(self._ended, job))
+                return
+
+    def _ended(self, job: PageJob, done: Future[None]) -> None:
+        error = None if done.cancelled() else done.exception()
+        if error is not None:
+            what = str(error) or type(error).__name__
+            log.warning("pages not written", glider=job.glider or "all", folder=str(job.folder), reason=what)
+        self._news(PagesWritten())
+
+
+def _prepare(cache: str) -> None:
+    """What the process does first: it yields to all others, and dies at once when it is told to."""
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with suppress(OSError):  # systemd's filter may refuse it
+        os.nice(_NICENESS)
+    os.environ.setdefault("MPLCONFIGDIR", cache)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

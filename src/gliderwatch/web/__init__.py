@@ -1,0 +1,1 @@
+"""The pages live, an API, and acknowledging from a phone: `gliderwatch web`."""

@@ -1,0 +1,276 @@
+"""The application: pages, news, API, and links that acknowledge. It only reads the state file, but for what
+`acknowledge` writes, which is the same as by command."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.middleware import Middleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, JSONResponse, Response, StreamingResponse
+from starlette.routing import Route
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from gliderwatch.config import Config
+from gliderwatch.errors import GliderwatchError
+from gliderwatch.export import maps
+from gliderwatch.figures.coast import world
+from gliderwatch.pages import render
+from gliderwatch.pages.reading import read_fleet, read_glider
+from gliderwatch.pages.render import Frame
+from gliderwatch.pages.view import GliderView, worst_first
+from gliderwatch.service.jsonl import assessment_line
+from gliderwatch.service.liveness import STALE, is_held, seconds_silent
+from gliderwatch.store.state_file import Store
+from gliderwatch.web import api, links
+from gliderwatch.web.cache import PageCache, stamp_of
+
+Acknowledge = Callable[[str, str, float], str]
+"""Takes an incident on: its id, who, when (s); what to tell in a sentence. Raises GliderwatchError."""
+LIVE = "events"
+FLEET_KEPT, GLIDER_KEPT = 60.0, 300.0
+"""Seconds for which a page holds while the state file does not change."""
+LOOK = 1.0
+"""Seconds between two looks at whether it has."""
+SIGN = 15.0
+"""Seconds between two signs of life of a stream of news: proxies close silent ones."""
+MOST = 10_000
+
+
+class Site:
+    """What is shown of one state file."""
+
+    def __init__(self, config: Config, acknowledge: Acknowledge) -> None:
+        self.config, self.acknowledge = config, acknowledge
+        self.state = Path(config.state.path)
+        self.key = links.key_of(self.state)
+        self.pages = PageCache(self._make, lambda: stamp_of(self.state), self._kept)
+        self.news = asyncio.Condition()
+
+    def _kept(self, path: str) -> float:
+        return FLEET_KEPT if path == "index.html" else GLIDER_KEPT
+
+    def frame(self, path: str) -> Frame:
+        """When a page is made, when the next is due, and whether the service runs."""
+        now = time.time()
+        silent = seconds_silent(self.state)
+        is_alive = is_held(self.state) and silent is not None and silent < STALE
+        warning = "" if is_alive else "gliderwatch does NOT RUN: nothing new is seen, and nobody is alerted."
+        return Frame(now, now + 2 * self._kept(path) + 60.0, LIVE, warning)
+
+    def _make(self, path: str) -> str:
+        frame = self.frame(path)
+        if path == "index.html":
+            return render.fleet_page(self.fleet(frame.now), frame, world())
+        store = Store.reading(self.state)
+        try:
+            with store.guarded():
+                for name in store.gliders():
+                    for kind, page in (("", render.glider_page), ("-sheet", render.sheet_page)):
+                        if path == render.file_of(name, kind):
+                            view = read_glider(store, name, self.config.attention(name), frame.now)
+                            return page(view, frame, world())
+        finally:
+            store.close()
+        raise KeyError(path)
+
+    def fleet(self, now: float, dives: int = 1) -> tuple[GliderView, ...]:
+        """All gliders as known at `now` (s), with so many dives of each."""
+        store = Store.reading(self.state)
+        try:
+            with store.guarded():
+                names = sorted({*self.config.gliders, *store.gliders()})
+                return read_fleet(store, names, self.config.attention, now, dives)
+        finally:
+            store.close()
+
+    async def look(self) -> None:
+        """Have pages made anew when there is news, and tell who looks at them; for ever."""
+        while True:
+            await asyncio.sleep(LOOK)
+            with suppress(GliderwatchError):  # the state cannot be read now: what is there stays
+                if await run_in_threadpool(self.pages.refresh):
+                    async with self.news:
+                        self.news.notify_all()
+
+
+# ----------------------------------------
+# Answers.
+
+
+def _site(request: Request) -> Site:
+    site: Site = request.app.state.site
+    return site
+
+
+async def page(request: Request) -> Response:
+    """A page of the fleet or of a glider."""
+    path = request.path_params.get("file", "index.html")
+    try:
+        text = await run_in_threadpool(_site(request).pages.get, path)
+    except KeyError:
+        raise HTTPException(404, "There is no such page.") from None
+    return HTMLResponse(text, headers={"Cache-Control": "no-cache"})
+
+
+async def events(request: Request) -> Response:
+    """News, as they come (server-sent events): `news` whenever pages were made anew."""
+    site = _site(request)
+
+    async def stream() -> AsyncIterator[str]:
+        yield "retry: 5000\n\n"
+        while not await request.is_disconnected():
+            try:
+                async with asyncio.timeout(SIGN), site.news:
+                    await site.news.wait()
+                yield "event: news\ndata: \n\n"
+            except TimeoutError:
+                yield ": well\n\n"
+
+    return StreamingResponse(stream(), media_type="text/event-stream", headers={"Cache-Control": "no-cache"})
+
+
+async def gliders(request: Request) -> Response:
+    """All gliders."""
+    views = await run_in_threadpool(_site(request).fleet, time.time())
+    return JSONResponse([api.glider(view) for view, _ in worst_first(views)])
+
+
+async def assessments(request: Request) -> Response:
+    """The last dives of a glider."""
+    try:
+        limit = int(request.query_params.get("limit", "100"))
+    except ValueError:
+        limit = 0
+    if not 1 <= limit <= MOST:
+        raise HTTPException(400, f"limit is a whole number from 1 to {MOST}.")
+    views = await run_in_threadpool(_site(request).fleet, time.time(), limit)
+    wanted = [view for view in views if view.name == request.path_params["name"].lower()]
+    if not wanted:
+        raise HTTPException(404, "There is no such glider.")
+    return JSONResponse([assessment_line(dive) for dive in wanted[0].dives])
+
+
+async def incidents(request: Request) -> Response:
+    """All incidents."""
+    views = await run_in_threadpool(_site(request).fleet, time.time())
+    return JSONResponse([api.incident(view, i) for view in views for i in view.incidents])
+
+
+async def geojson(request: Request) -> Response:
+    """All gliders for a map."""
+    views = await run_in_threadpool(_site(request).fleet, time.time(), 150)
+    return Response(maps.as_geojson(views), media_type="application/geo+json")
+
+
+async def openapi(_request: Request) -> Response:
+    """The description of the API."""
+    return JSONResponse(api.openapi())
+
+
+async def acknowledge(request: Request) -> Response:
+    """GET: a button, as scanners of mail open links. POST: takes the incident on."""
+    site = _site(request)
+    frame = Frame(time.time(), time.time() + FLEET_KEPT)
+    try:
+        seconds = site.config.web.link_hours * 3600.0
+        incident, recipient = links.opened(site.key, request.path_params["token"], seconds)
+        if request.method == "POST":
+            told = await run_in_threadpool(site.acknowledge, incident, recipient, frame.now)
+            return _ack_page(frame, incident, recipient, told=told)
+    except links.LinkError as error:
+        return _ack_page(frame, "", "", told=str(error), status=403)
+    except GliderwatchError as error:
+        return _ack_page(frame, "", "", told=str(error), status=409)
+    return _ack_page(frame, incident, recipient)
+
+
+def _ack_page(frame: Frame, incident: str, recipient: str, *, told: str = "", status: int = 200) -> Response:
+    text = render.ack_page(frame, incident, recipient, told)
+    return HTMLResponse(text, status_code=status, headers={"Cache-Control": "no-store"})
+
+
+async def problem(_request: Request, error: Exception) -> Response:
+    """What went wrong, in words; nothing of the inside."""
+    if isinstance(error, HTTPException):
+        return JSONResponse({"error": error.detail}, status_code=error.status_code)
+    if isinstance(error, GliderwatchError):
+        text = "The state cannot be read now; see gliderwatch status."
+        return JSONResponse({"error": text}, status_code=503)
+    return JSONResponse({"error": "A mistake in gliderwatch; its log says more."}, status_code=500)
+
+
+# ----------------------------------------
+# The application.
+
+
+class Headers:
+    """Puts the headers that keep a page to itself on every answer."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+        policy = f"{render.page_policy()}; frame-ancestors 'none'"
+        self._headers = [
+            (name.lower().encode(), value.encode())
+            for name, value in (
+                ("Content-Security-Policy", policy),
+                ("X-Content-Type-Options", "nosniff"),
+                ("Referrer-Policy", "no-referrer"),
+                ("Cross-Origin-Opener-Policy", "same-origin"),
+                ("Cross-Origin-Resource-Policy", "same-origin"),
+            )
+        ]
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request."""
+
+        async def sending(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] = [*message.get("headers", []), *self._headers]
+            await send(message)
+
+        await self._app(scope, receive, sending)
+
+
+def application(config: Config, acknowledge_incident: Acknowledge) -> Starlette:
+    """The application for a configuration. Raises GliderwatchError where its key cannot be had."""
+
+    @asynccontextmanager
+    async def life(app: Starlette) -> AsyncIterator[None]:
+        app.state.site = Site(config, acknowledge_incident)
+        looking = asyncio.create_task(app.state.site.look())
+        yield
+        looking.cancel()
+
+    return Starlette(
+        routes=[
+            Route("/", page),
+            Route(f"/{LIVE}", events),
+            Route("/api/gliders", gliders),
+            Route("/api/gliders/{name}/assessments", assessments),
+            Route("/api/incidents", incidents),
+            Route("/api/gliders.geojson", geojson),
+            Route("/api/openapi.json", openapi),
+            Route("/ack/{token}", acknowledge, methods=["GET", "POST"]),
+            Route("/{file}", page),
+        ],
+        middleware=[Middleware(Headers), Middleware(TrustedHostMiddleware, allowed_hosts=hosts(config))],
+        exception_handlers={HTTPException: problem, GliderwatchError: problem, Exception: problem},
+        lifespan=life,
+    )
+
+
+def hosts(config: Config) -> list[str]:
+    """The names under which it may be asked: no page of another host can then have a browser ask for it."""
+    if config.web.open_to_network:
+        return ["*"]
+    public = [config.web.public_url.host] if config.web.public_url is not None else []
+    return ["127.0.0.1", "localhost", "[::1]", str(config.web.address), *filter(None, public)]

@@ -1,0 +1,41 @@
+"""`gliderwatch layers`: what it prints and what it writes."""
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from gliderwatch.cli.main import main
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(main, ["layers", *map(str, arguments)])
+
+
+def test_simulate_draws_the_run_and_says_what_it_covered(tmp_path: Path) -> None:
+    result = run("simulate", "--preset", "simulation", "--out", tmp_path / "figures", "--json")
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.output)
+    assert found["coverage_least"] > 0.99
+    assert found["resets"] == 0
+    assert "<svg" in Path(found["figure"]).read_text(encoding="utf-8")[:500]
+
+
+@pytest.mark.real
+def test_replay_compares_the_methods(shared_data: Path) -> None:
+    mission = shared_data / "usf-sam-2019"
+    result = run("replay", mission / "from-glider", "--cache", mission / "cache", "--json")
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.output)
+    assert found["means"]["full yos"]["coverage"] == 1.0
+    assert found["means"]["composite, two full casts"]["coverage"] > 0.97
+    assert len(found["segments"]["composite"]) == found["means"]["composite"]["segments"] == 18
+
+
+@pytest.mark.real
+def test_replay_of_a_sensor_that_no_file_has_says_so(shared_data: Path) -> None:
+    mission = shared_data / "usf-sam-2019"
+    result = run("replay", mission / "from-glider", "--cache", mission / "cache", "--sensor", "sci_no_such")
+    assert result.exit_code == 2
+    assert "no segment with 6 casts of sci_no_such" in result.output

@@ -1,0 +1,233 @@
+"""The pages live: what is served, to whom, and what a link that acknowledges may do."""
+
+from __future__ import annotations
+
+import asyncio
+import stat
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import jsonschema
+import pytest
+from itsdangerous import URLSafeTimedSerializer
+from starlette.testclient import TestClient
+
+from gliderwatch.cli.status import acknowledge_incident
+from gliderwatch.config import Config, load
+from gliderwatch.errors import ConfigError
+from gliderwatch.incidents.notifications import NotificationState
+from gliderwatch.model import Assessment, Incident, Segment, SegmentId
+from gliderwatch.pipeline import GliderState, Outcome
+from gliderwatch.store.state_file import Store
+from gliderwatch.web import app, links
+from gliderwatch.web.cache import PageCache
+from unit.test_pages import HOSTILE, dive, incident
+
+NAMES = ("bruce", "electa")
+
+
+def keep(state: Path, glider: str, dives: tuple[Assessment, ...], incidents: tuple[Incident, ...]) -> None:
+    """Put results of a glider into a state file."""
+    store = Store.open(state)
+    with store.transaction():
+        identity = SegmentId(dives[-1].t_dive, glider, dives[-1].segment)
+        store.segments.put(Segment(identity, "m", "sbd", dives[-1].t_surface, (1, 1, ""), {}))
+        store.apply(glider, Outcome(GliderState(), float("-inf"), dives, incidents, None))
+        store.keep_said(glider, NotificationState())
+    store.close()
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Config:
+    """A configuration whose state file knows two gliders; electa has an incident."""
+    path = tmp_path / "gliderwatch.yml"
+    (tmp_path / "root").mkdir()
+    path.write_text(
+        f"dockserver: {{roots: [{tmp_path}/root]}}\nstate: {{path: {tmp_path}/state.sqlite}}\n"
+        "web: {public_url: https://gliders.example.org/}\ngliders: {bruce: , electa: }\n"
+    )
+    now = time.time()
+    for name in NAMES:
+        dives = tuple(
+            replace(
+                dive(), glider=name, t_dive=now - (k + 3) * 3600, t_surface=now - k * 3600, reason=HOSTILE
+            )
+            for k in (8, 4, 1)
+        )
+        opened = (replace(incident(), glider=name, opened_at=now - 3600),) if name == "electa" else ()
+        keep(tmp_path / "state.sqlite", name, dives, opened)
+    return load(path)
+
+
+@pytest.fixture
+def client(config: Config) -> Iterator[TestClient]:
+    def take_on(identity: str, by: str, now: float) -> str:
+        entry, _ = acknowledge_incident(config, identity, by, "", now)
+        return f"{entry.incident.id}: taken on by {by}."
+
+    with TestClient(app.application(config, take_on), base_url="http://127.0.0.1:8463") as client:
+        yield client
+
+
+def ack_of(config: Config) -> str | None:
+    store = Store.reading(Path(config.state.path))
+    try:
+        return (
+            {ack.by for ack in store.notes.acks("electa").values()}.pop()
+            if store.notes.acks("electa")
+            else None
+        )
+    finally:
+        store.close()
+
+
+def link(config: Config, identity: str = "electa/anomaly/1", who: str = "Ann") -> str:
+    return f"/ack/{links.token(links.key_of(Path(config.state.path)), identity, who)}"
+
+
+def test_pages_are_those_of_the_files_and_say_that_the_service_is_down(client: TestClient) -> None:
+    page = client.get("/")
+    assert page.status_code == 200
+    assert page.text.index("electa</a>") < page.text.index("bruce</a>")  # the worst first
+    assert "gliderwatch does NOT RUN" in page.text
+    for path in ("/electa.html", "/electa-sheet.html", "/index.html"):
+        assert client.get(path).status_code == 200, path
+    assert "<script>alert" not in client.get("/electa.html").text
+    assert client.get("/nobody.html").status_code == 404
+    assert client.get("/..%2Fstate.sqlite").status_code == 404
+
+
+def test_every_answer_is_kept_to_itself(client: TestClient) -> None:
+    for path in ("/", "/api/gliders", "/nobody.html", "/ack/x"):
+        headers = client.get(path).headers
+        assert headers["content-security-policy"].startswith("default-src 'none'; style-src 'sha256-")
+        assert "frame-ancestors 'none'" in headers["content-security-policy"]
+        assert "unsafe" not in headers["content-security-policy"]
+        assert headers["x-content-type-options"] == "nosniff"
+
+
+def test_another_host_name_is_refused(client: TestClient) -> None:
+    """A page elsewhere whose name is made to lead to this machine gets nothing."""
+    assert client.get("/", headers={"Host": "evil.example"}).status_code == 400
+    assert client.get("/", headers={"Host": "gliders.example.org"}).status_code == 200
+
+
+def test_the_api_says_what_it_describes(client: TestClient) -> None:
+    described = client.get("/api/openapi.json").json()
+    for path, methods in described["paths"].items():
+        answer = client.get(path.format(name="electa"))
+        assert answer.status_code == 200, path
+        (content,) = methods["get"]["responses"]["200"]["content"].items()
+        assert answer.headers["content-type"].startswith(content[0])
+        schema = {**content[1]["schema"], "components": described["components"]}
+        jsonschema.Draft202012Validator(schema).validate(answer.json())
+    routes = {r.path for r in client.app.routes if r.path.startswith("/api/")}  # type: ignore[attr-defined]
+    assert routes == {*described["paths"], "/api/openapi.json"}
+    assert [g["name"] for g in client.get("/api/gliders").json()] == ["electa", "bruce"]
+    assert len(client.get("/api/gliders/electa/assessments?limit=2").json()) == 2
+    for limit in ("0", "x", "1e9"):
+        assert client.get(f"/api/gliders/electa/assessments?limit={limit}").status_code == 400
+    assert client.get("/api/gliders/nobody/assessments").status_code == 404
+
+
+def test_a_link_acknowledges_only_when_its_button_is_pressed(client: TestClient, config: Config) -> None:
+    path = link(config)
+    for _ in range(2):  # a scanner of mail opens links
+        page = client.get(path)
+        assert '<form method="post">' in page.text
+        assert page.headers["cache-control"] == "no-store"
+    assert ack_of(config) is None
+    assert "taken on by Ann" in client.post(path).text
+    assert ack_of(config) == "Ann"
+    assert [i["acknowledged_by"] for i in client.get("/api/incidents").json()] == ["Ann"]
+
+
+def test_a_forged_foreign_or_expired_link_does_nothing(
+    client: TestClient, config: Config, monkeypatch
+) -> None:  # type: ignore[no-untyped-def]
+    good = link(config)
+    old = time.time() - 49 * 3600
+    monkeypatch.setattr("itsdangerous.timed.time.time", lambda: old)
+    expired = link(config)
+    monkeypatch.undo()
+    foreign = "/ack/" + links.token("another-key-of-another-gliderwatch-entirely", "electa/anomaly/1", "Eve")
+    key = links.key_of(Path(config.state.path))
+    salted = f"/ack/{URLSafeTimedSerializer(key, salt='x').dumps(['electa/anomaly/1', 'Eve'])}"
+    for path in (good[:-3] + "AAA", f"/ack/{good[5:].swapcase()}", expired, foreign, salted, "/ack/x.y.z"):
+        for answer in (client.get(path), client.post(path)):
+            assert answer.status_code == 403, path
+            assert "<form" not in answer.text
+    assert ack_of(config) is None
+    gone = client.post(link(config, "electa/anomaly/2"))
+    assert gone.status_code == 409
+    assert "there is no incident electa/anomaly/2" in gone.text
+    hostile = client.get(link(config, HOSTILE, HOSTILE))
+    assert "<script>alert" not in hostile.text
+
+
+def test_the_key_is_for_its_user_alone_and_made_once(tmp_path: Path) -> None:
+    keys: set[str] = set()
+    threads = [
+        threading.Thread(target=lambda: keys.add(links.key_of(tmp_path / "s.sqlite"))) for _ in range(8)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(keys) == 1
+    assert stat.S_IMODE((tmp_path / "web.key").stat().st_mode) == 0o600
+    assert [path.name for path in tmp_path.iterdir()] == ["web.key"]
+
+
+def test_it_stays_at_home_unless_that_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "gliderwatch.yml"
+    path.write_text(f"dockserver: {{roots: [{tmp_path}]}}\nweb: {{address: 0.0.0.0}}\n")
+    with pytest.raises(ConfigError, match="not loopback"):
+        load(path)
+
+
+# --------------------------------------------------------------------------- news
+
+
+def test_news_come_when_the_state_has_changed(client: TestClient, config: Config) -> None:
+    site: app.Site = client.app.state.site  # type: ignore[attr-defined]
+    before = client.get("/").text
+
+    async def hear() -> None:
+        async with asyncio.timeout(20), site.news:
+            await site.news.wait()
+
+    heard = client.portal.start_task_soon(hear)  # type: ignore[union-attr]
+    acknowledge_incident(config, "electa/anomaly/1", "Bob", "", time.time())
+    heard.result(timeout=20)
+    assert "taken on by Bob" not in before
+    assert "taken on by Bob" in client.get("/").text
+
+
+def test_nobody_waits_for_a_page_that_is_there() -> None:
+    made: list[str] = []
+    clock, stamp = [0.0], [((0, 0),)]
+
+    def make(path: str) -> str:
+        if path == "none":
+            raise KeyError(path)
+        made.append(path)
+        return f"{path} {len(made)}"
+
+    cache = PageCache(make, lambda: stamp[0], lambda _path: 60.0, lambda: clock[0])
+    assert cache.get("a") == cache.get("a") == "a 1"
+    assert not cache.refresh()
+    stamp[0] = ((1, 1),)
+    assert cache.get("a") == "a 1"  # as it was a moment ago
+    assert cache.refresh()
+    assert cache.get("a") == "a 2"
+    clock[0] = 60.0
+    assert cache.refresh()
+    clock[0] = 700.0  # nobody has asked for ten minutes
+    assert not cache.refresh()
+    assert cache.get("a") == "a 4"
+    with pytest.raises(KeyError):
+        cache.get("none")
