@@ -164,7 +164,7 @@ class TestWithoutFile:
             ["electa CALLED and sent no file"],
             ["electa CALLS WITHOUT A FILE: 2 in a row"],
             [],
-            ["ALL CLEAR electa: it sends files again"],
+            ["electa ALL CLEAR: it sends files again"],
         ]
         assert [a.severity for alerts in made for a in alerts] == [0, 1, 0]
 
