@@ -20,6 +20,7 @@ from common import machine
 from flights import HOUR, SEAS, judged, navigated, of, read
 
 from gliderwatch.estimation.dive_measurement import observe
+from gliderwatch.forecast.constants import CHI2_COVERED
 from gliderwatch.model import Array, Dive, readonly
 from gliderwatch.papers import two_stage
 from gliderwatch.papers.two_stage import TwoStageParams
@@ -56,8 +57,6 @@ FIXED = Parameters(
     readonly([[0.25] * 2]),
     readonly([each.omega for each in M2_K1]),
 )
-INSIDE = 5.991
-"""95 % of chi-square with 2 degrees of freedom."""
 NAMES = ("persistence", "two-stage", "two-stage 119 h", "fixed", "one sea", "residual", "tides", "chosen")
 
 
@@ -205,8 +204,8 @@ def line(name: str, found: Sequence[Row], cost: float) -> str:
         return 100 * float(np.sqrt(np.mean([r.errors[forecast] ** 2 for r in found])))
 
     on = np.mean([r.source.startswith("tides") for r in found])
-    inside = np.mean([r.nis < INSIDE for r in found])
-    spread = np.mean([r.spread < INSIDE for r in found])
+    inside = np.mean([r.nis < CHI2_COVERED for r in found])
+    spread = np.mean([r.spread < CHI2_COVERED for r in found])
     metres = np.mean([r.metres for r in found], axis=0)
     errors = " ".join(f"{rms(forecast):6.2f}" for forecast in NAMES)
     return (

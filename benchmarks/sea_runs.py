@@ -15,7 +15,7 @@ import msgspec
 
 import gliderwatch
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.model import Alert, Kind, Segment
+from gliderwatch.model import Alert, Assessment, Kind, Segment
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, process
 from gliderwatch.score.accuracy import results as forecast_results
@@ -191,6 +191,42 @@ def run(job: Job, *, direct: bool = False) -> Result:
         start,
         _cost(flown.segments, params) if job.fault == HEALTHY and job.seed == 0 else 0.0,
         cpu,
+    )
+
+
+def run_bare(job: Job) -> Result:
+    """The same through `pipeline.process` alone, in a quarter of the time: of messages there are those that
+    an incident opens; one that opens and is gone with the next file counts as well."""
+    flown, params = flight(job), GliderParams()
+    begun, start = time.process_time(), flown.segments[0].id.opened_at
+    state, dives, opened, said = GliderState(), dict[float, Assessment](), dict[str, Message](), []
+    for segment, at in zip(flown.segments, flown.on_shore, strict=True):
+        outcome = process(state, segment, params)
+        state = outcome.state
+        dives = {t: a for t, a in dives.items() if t < outcome.since}
+        dives |= {a.t_dive: a for a in outcome.assessments}
+        for i in outcome.incidents:
+            hours = (i.opened_at - start) / HOUR, (max(i.opened_at, at) - start) / HOUR
+            opened.setdefault(i.id, Message(*hours, str(i.kind), f"{i.kind} opened: {i.worst.reason}"))
+        said += [outcome.expected] if outcome.expected is not None else []
+    every = [dives[t] for t in sorted(dives)]
+    onset = None if job.fault == HEALTHY else ONSET * 24
+    until = start + HOUR * onset if onset is not None else float("inf")
+    settled = [a for a in every if a.t_dive >= start + SETTLED * DAY]
+    cost = (time.process_time() - begun) / max(len(every), 1)
+    return Result(
+        job.sea,
+        job.seed,
+        job.fault,
+        (flown.truth[-1].t_surface - start) / HOUR,
+        onset,
+        tuple(sorted(opened.values(), key=lambda m: m.hours)),
+        dive_results(every, flown.truth),
+        tuple(f"{(a.t_dive - start) / HOUR:.1f} h, flag {a.flag}: {a.reason}" for a in every if a.flag),
+        forecast_results(said, settled, until),
+        start,
+        cost,
+        cost,
     )
 
 

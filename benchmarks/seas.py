@@ -24,7 +24,7 @@ from pathlib import Path
 from statistics import mean, median
 
 from common import machine
-from sea_runs import AS_IT_IS, FAULTS, SETTLED, Job, Message, Result, as_json, run
+from sea_runs import AS_IT_IS, FAULTS, SETTLED, Job, Message, Result, as_json, run, run_bare
 
 from gliderwatch.model import Kind
 from gliderwatch.score.measures import HEALTHY, DiveResult
@@ -240,17 +240,22 @@ def main() -> None:
     parser.add_argument("--days", type=float, default=30.0, help="of healthy gliders")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--direct", action="store_true", help="write no checkpoints: half of the time")
+    parser.add_argument("--bare", action="store_true", help="incidents alone, no messages: a quarter of it")
     parser.add_argument("--told", action="store_true", help="every message that should not be")
     parser.add_argument("--json", type=Path, help="all measures and all that was told")
     parser.add_argument("--kept", type=Path, default=Path(__file__).parents[1] / "build" / "seas")
     arguments = parser.parse_args()
     begun, context = time.monotonic(), multiprocessing.get_context("spawn")
     print(machine())
+    results = list[Result]()
     with ProcessPoolExecutor(max_workers=arguments.workers, mp_context=context) as pool:
-        results = []
-        for result in pool.map(partial(run, direct=arguments.direct), jobs(arguments)):
-            results.append(result)
-            print(f"\r{len(results)} gliders", end="", file=sys.stderr, flush=True)
+        try:
+            work = run_bare if arguments.bare else partial(run, direct=arguments.direct)
+            for result in pool.map(work, jobs(arguments)):
+                results.append(result)
+                print(f"\r{len(results)} gliders", end="", file=sys.stderr, flush=True)
+        except KeyboardInterrupt:  # what is done is worth its table
+            pool.shutdown(wait=False, cancel_futures=True)
     print(file=sys.stderr)
     well, ill = tables(results)
     lines = chain(shown(well, ill), told(results) if arguments.told else ())

@@ -26,6 +26,7 @@ import numpy as np
 from common import machine
 from flights import read, various
 
+from gliderwatch.forecast.constants import CHI2_COVERED
 from gliderwatch.forecast.surfacing import Surfacings, ground, is_unseen
 from gliderwatch.model import Dive, NextSurfacing, Segment, Unusable
 from gliderwatch.navigation.dives import Navigation, extend
@@ -107,7 +108,7 @@ def row(forecast: Forecast, then: Dive) -> tuple[float, ...]:
         float(np.hypot(*(flown * interval - way))) / 1e3,
         abs(late) / 60,
         abs(then.end.t - dive.end.t - interval) / 60,
-        bool(off @ np.linalg.solve(cov, off) < 5.991),
+        bool(off @ np.linalg.solve(cov, off) < CHI2_COVERED),
         bool(abs(late) < 1.96 * expected.t_sigma),
     )
 

@@ -8,6 +8,7 @@ from alert_support import DISAGREE, DIVE, HEALTHY, SLOW, SURFACE, incident
 from gliderwatch.estimation.modes import MODES
 from gliderwatch.estimation.verdict import FASTER, Blame
 from gliderwatch.fleet.cross_check import Fault, Hypothesis
+from gliderwatch.health.rule import Finding
 from gliderwatch.incidents.notices import (
     Aborted,
     AbortReport,
@@ -24,6 +25,10 @@ from gliderwatch.incidents.notices import (
     DiffersFromNeighbours,
     DriftEllipse,
     Fleet,
+    HealthFound,
+    HealthIncident,
+    HealthOver,
+    HealthReminder,
     Irregularity,
     JudgedAgain,
     NewRegime,
@@ -33,6 +38,7 @@ from gliderwatch.incidents.notices import (
     Resumed,
     SendsAgain,
     Situation,
+    StillAborted,
     StillOpen,
     Surfaced,
     TwoGliders,
@@ -135,10 +141,30 @@ CALL = Call(
 CUT = replace(CALL, over=True, announced=("0308a3f2.sbd",))
 
 
+FIX = Fix(SURFACE - 240.0, 24.21, -83.01)
+_FOUND = Finding(
+    "leak",
+    Severity.CRITICAL,
+    DIVE,
+    "leak detector at 2.380 V, twice in a row below 2.400 V",
+    "leak_voltage",
+    tuple((DIVE + 600.0 * k, 2.48 - 0.01 * k) for k in range(10)),
+)
+LEAK = HealthIncident(
+    "electa/health/leak/1", "electa", "leak", Severity.CRITICAL, DIVE, SURFACE, None, _FOUND, _FOUND
+)
+
+
 def abort(what: Happening, cause: str) -> Alert:
     """That a glider reported something in a call."""
     report = AbortReport(what, SURFACE - 600.0, cause, Severity.CRITICAL)
     return message(Kind.ABORT, Aborted((report,), CALL))
+
+
+def acknowledged(note: str, *, is_undone: bool) -> Alert:
+    """That Ann has taken an incident on, or given it back."""
+    content = Acknowledged(incident().id, Kind.ANOMALY, DIVE, "Ann", note, is_undone)
+    return message(Kind.ACKNOWLEDGED, content, Severity.INFO)
 
 
 def kinds() -> dict[str, Alert]:
@@ -177,10 +203,8 @@ def kinds() -> dict[str, Alert]:
         "correction-stands": message(
             Kind.CORRECTION, Corrected(incident(), incident(), replace(SLOW, speed=0.151), why, situation())
         ),
-        "acknowledged": message(
-            Kind.ACKNOWLEDGED, Acknowledged(incident(), "Ann", "boat leaves at 6", False), info
-        ),
-        "given-back": message(Kind.ACKNOWLEDGED, Acknowledged(incident(), "Ann", "", True), info),
+        "acknowledged": acknowledged("boat leaves at 6", is_undone=False),
+        "given-back": acknowledged("", is_undone=True),
         "surfacing": message(Kind.SURFACING, Surfaced(HEALTHY, DIVE - 1800, NEXT), info),
         "regime": message(Kind.REGIME, NewRegime(regime, 0.29, DIVE, situation(regime, 0.47, 0.48)), info),
         "overdue": message(Kind.OVERDUE, Overdue(absence(fleet), True), warning),
@@ -209,6 +233,13 @@ def kinds() -> dict[str, Alert]:
             DiffersFromNeighbours(
                 Hypothesis("", Fault.TURN, DIVE, 6, 0.2, 0.03, 30.0), ("angus", "bruce"), 8e3
             ),
+        ),
+        "health": message(Kind.HEALTH, HealthFound(LEAK, False, FIX)),
+        "health-reminder": message(Kind.REMINDER, HealthReminder(LEAK, 26.0, FIX)),
+        "health-over": message(Kind.ALL_CLEAR, HealthOver(LEAK, False, FIX), info),
+        "still-aborted": message(
+            Kind.REMINDER,
+            StillAborted((AbortReport(Happening.ABORTING, DIVE, "LEAK", Severity.CRITICAL),), CALL, 26.0),
         ),
         "operator-files": message(
             Kind.OPERATOR,

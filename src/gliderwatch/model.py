@@ -136,6 +136,15 @@ class Aborts:
 
 
 @dataclass(frozen=True, slots=True)
+class CallReading:
+    """A quantity by ``name`` that a glider printed in a call: measured at ``t`` (s), its ``value`` (SI)."""
+
+    name: str
+    t: float
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
 class Call:
     """One connection of a glider, as far as its log tells.
 
@@ -143,7 +152,9 @@ class Call:
     end of the connection is in the log, ``calls_back`` whether it said that it would. ``fix`` is the last
     position, ``waypoint`` (latitude, longitude, degrees) where it is bound; ``reason`` why it is up.
     ``announced`` are the names of files whose transfer began, ``sent`` of those whose transfer was done;
-    ``mission`` and ``segment`` what it named last as running, at ``mission_t`` (s).
+    ``mission`` and ``segment`` (its 8.3 name ``short``) what it named last as running, at ``mission_t`` (s).
+    ``readings`` are the last
+    ones of each quantity that rules of health look at.
     """
 
     glider: str
@@ -158,10 +169,12 @@ class Call:
     mission: str = ""
     mission_t: float | None = None
     segment: str = ""
+    short: str = ""
     announced: tuple[str, ...] = ()
     sent: tuple[str, ...] = ()
     aborts: tuple[Aborts, ...] = ()
     happened: tuple[Happened, ...] = ()
+    readings: tuple[CallReading, ...] = ()
 
 
 # --------------------------------------------------------------------------- navigation
@@ -369,6 +382,7 @@ class Kind(StrEnum):
     ACKNOWLEDGED = "acknowledged"
     ABORT = "abort"
     CALL = "call"
+    HEALTH = "health"
     NEIGHBOURS = "neighbours"
     OPERATOR = "operator"
 

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from gliderwatch.incidents.acknowledgement import acknowledge_thread
+from gliderwatch.incidents.notifications import unacknowledged
 from gliderwatch.model import Alert, Kind, SegmentId, Severity
 from gliderwatch.params import GliderParams
 from gliderwatch.service import judgement, transaction
@@ -230,3 +232,47 @@ def test_replay_of_two_real_calls_of_which_one_sent_nothing(shared_data: Path) -
     alerts = report.store.alerts()
     assert [(a.kind, a.severity) for a in alerts] == [(Kind.CALL, Severity.INFO)]
     assert report.files[Status.TAKEN] == 2
+
+
+class TestAnnouncedFiles:
+    """A file that was announced in a call and never came is named, whatever name it would have."""
+
+    BOTH = "Starting zModem transfer of 01030033.scd to/from electa size is 8208\n" + DONE + LOST
+
+    def test_one_that_never_came_is_named_an_hour_later(self, dock: Dock) -> None:
+        dock.call(T0, status(T0) + self.BOTH)
+        known = dock.store.known("electa")
+        assert known.not_come(T0 - HOUR, T0 + 0.5 * HOUR) == ()
+        assert known.not_come(T0 - HOUR, T0 + 2 * HOUR) == ((T0, "01030033.scd"),)
+
+    def test_one_that_came_under_its_full_name_is_not(self, dock: Dock) -> None:
+        dock.call(T0, status(T0) + self.BOTH)
+        dock.store.hear(SegmentId(T0 - 4 * HOUR, "electa", "electa-2025-022-0-33"), None, T0 + 100)
+        assert dock.store.known("electa").not_come(T0 - HOUR, T0 + 2 * HOUR) == ()
+
+    def test_science_files_are_not_looked_for(self, dock: Dock) -> None:
+        science = self.BOTH.replace(".scd", ".tcd")
+        dock.call(T0, status(T0) + science)
+        assert dock.store.known("electa").not_come(T0 - HOUR, T0 + 2 * HOUR) == ()
+
+
+class TestAbortsThatGoOn:
+    """Reminders come until somebody takes an abort on"""
+
+    def prompt(self, dock: Dock, t: float) -> list[Alert]:
+        return dock.call(t, status(t, "", lat=61.0 + (t - T0) / 1e6) + PROMPT)
+
+    def test_reminder_after_a_day_and_none_once_acknowledged(self, dock: Dock) -> None:
+        (first,) = dock.call(T0, status(T0) + ABORTING)
+        (prompt,) = self.prompt(dock, T0 + 6 * HOUR)
+        assert prompt.incident == first.incident
+        assert self.prompt(dock, T0 + 26 * HOUR) == []  # not within a day of the last message
+        (again,) = self.prompt(dock, T0 + 49 * HOUR)
+        assert again.kind is Kind.REMINDER and again.incident == first.incident
+        assert again.title == "electa STILL ABORTED: leak"
+        ack = acknowledge_thread(first.incident, Severity.CRITICAL, "ann", "", T0 + 50 * HOUR)
+        dock.store.notes.acknowledge("electa", ack)
+        assert self.prompt(dock, T0 + 120 * HOUR) == []
+        said, incidents = dock.store.said("electa"), dock.store.known("electa").incidents()
+        assert unacknowledged(said, incidents, dock.store.notes.acks("electa")) == frozenset()
+        assert unacknowledged(said, incidents, {}) == {first.incident}

@@ -129,12 +129,13 @@ def test_packed_values_and_fill_values(tmp_path):
     assert field.at(T0 + 9 * HOUR, 27.3, -84.2, 0.0)[0] == pytest.approx(expected, abs=1e-4)
 
 
-def test_a_fill_value_that_nobody_calls_one(tmp_path):
+@pytest.mark.parametrize(("value", "current"), [(-9999.0, False), (11.0, False), (9.0, True)])
+def test_a_fill_value_that_nobody_calls_one(tmp_path, value, current):
     data = dataset()
-    data["uo"][:, 0, 0] = -9999.0
-    data["vo"][:, 0, 0] = -9999.0
+    data["uo"][:, 0, 0] = value
+    data["vo"][:, 0, 0] = value
     field = read_field([written(tmp_path, data, uo={"_FillValue": None}, vo={"_FillValue": None})])
-    assert "land or a gap" in field.at(T0, 26.0, -86.0, 0.0)
+    assert ("land or a gap" in field.at(T0, 26.0, -86.0, 0.0)) != current
 
 
 @pytest.mark.parametrize("units", ["cm s-1", "cm/s", "cm sec^-1"])

@@ -31,7 +31,6 @@ from missions import Leg, cut, ending, feed, mission
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 FIRST = GOLDEN / "schema-1.sqlite.gz"
-FOURTH, GOES_ON = GOLDEN / "schema-4.sqlite.gz", GOLDEN / "schema-4-goes-on.json.gz"
 LEGS = [Leg(heading=0.5 * k) for k in range(6)]
 
 
@@ -136,17 +135,18 @@ class TestOpening:
         assert after.opened_at < before.opened_at, "today's estimator sees it sooner"
         assert len(made) == 31
 
-    def test_a_state_file_of_schema_4_that_was_cut_is_gone_on_from(self, path):
+    @pytest.mark.parametrize("schema", [4, 7])
+    def test_a_state_file_that_was_cut_is_gone_on_from(self, path, schema):
         """`keep_days` has removed what was before its first checkpoint: that is read, not made again. What
         comes next gives dives, flags and the incident that the code that wrote it made of the same segments;
         speeds are those of another estimator."""
         path.parent.mkdir()
-        path.write_bytes(gzip.decompress(FOURTH.read_bytes()))
+        path.write_bytes(gzip.decompress((GOLDEN / f"schema-{schema}.sqlite.gz").read_bytes()))
         with sqlite3.connect(path) as db:
-            assert db.execute("PRAGMA user_version").fetchone() == (4,)
+            assert db.execute("PRAGMA user_version").fetchone() == (schema,)
             assert db.execute("SELECT milestone FROM segments ORDER BY opened_at").fetchone() == (2,)
             cut = db.execute("SELECT max(opened_at) FROM segments").fetchone()[0]
-        then = json.loads(gzip.decompress(GOES_ON.read_bytes()))
+        then = json.loads(gzip.decompress((GOLDEN / f"schema-{schema}-goes-on.json.gz").read_bytes()))
         come = [codec.decode(base64.b64decode(record), Segment) for record in then.pop("segments")]
         with closing(Store.open(path)) as store:
             speaking = Routing(channels=lambda alert: ["mail"], notices=lambda glider: False)

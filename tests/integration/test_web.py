@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import stat
 import threading
 import time
@@ -17,14 +18,16 @@ from starlette.testclient import TestClient
 
 from gliderwatch.cli.status import acknowledge_incident
 from gliderwatch.config import Config, load
+from gliderwatch.delivery import links
 from gliderwatch.errors import ConfigError
 from gliderwatch.incidents.notifications import NotificationState
-from gliderwatch.model import Assessment, Incident, Segment, SegmentId
+from gliderwatch.messages.samples import SAMPLES
+from gliderwatch.model import Alert, Assessment, Incident, Kind, Segment, SegmentId
 from gliderwatch.pipeline import GliderState, Outcome
 from gliderwatch.store.state_file import Store
-from gliderwatch.web import app, links
+from gliderwatch.web import app
 from gliderwatch.web.cache import PageCache
-from unit.test_pages import HOSTILE, dive, incident
+from unit.test_pages import HOSTILE, NOW, dive, incident
 
 NAMES = ("bruce", "electa")
 
@@ -143,6 +146,10 @@ def test_a_link_acknowledges_only_when_its_button_is_pressed(client: TestClient,
     assert "taken on by Ann" in client.post(path).text
     assert ack_of(config) == "Ann"
     assert [i["acknowledged_by"] for i in client.get("/api/incidents").json()] == ["Ann"]
+    client.post(path, data={"by": "Bob\r\n<b>"})
+    assert ack_of(config) == "Bob <b> (Ann)"
+    client.post(path, content=b"by=" + b"x" * 5000)
+    assert ack_of(config) == "Ann"
 
 
 def test_a_forged_foreign_or_expired_link_does_nothing(
@@ -231,3 +238,55 @@ def test_nobody_waits_for_a_page_that_is_there() -> None:
     assert cache.get("a") == "a 4"
     with pytest.raises(KeyError):
         cache.get("none")
+
+
+# --------------------------------------------------------------------------- links in messages
+
+
+class Kept:
+    """A channel that keeps what it is to send."""
+
+    def __init__(self) -> None:
+        self.sent: list[Alert] = []
+
+    def prepare(self) -> None:
+        pass
+
+    def send(self, alert: Alert) -> None:
+        self.sent.append(alert)
+
+
+def test_a_message_of_an_incident_ends_with_links(client: TestClient, config: Config) -> None:
+    kept = Kept()
+    (channel,) = links.linked({"duty": kept}, "https://g.example.org/", Path(config.state.path)).values()
+    alert = replace(SAMPLES[Kind.ANOMALY](NOW), glider="electa", incident="electa/anomaly/1+")
+    channel.send(alert)
+    (sent,) = kept.sent
+    path = re.search(r"^Take it on: https://g\.example\.org(/ack/\S+)$", sent.body, re.M)
+    assert path is not None
+    assert "Page: https://g.example.org/electa.html" in sent.body
+    assert sent.html.count("<a href") >= 2
+    assert (sent.id, sent.title) == (alert.id, alert.title)
+    assert "taken on by duty" in client.post(path[1]).text
+    assert ack_of(config) == "duty"
+
+
+@pytest.mark.parametrize(
+    ("kind", "incident", "glider", "labels"),
+    [
+        (Kind.ANOMALY, "electa/anomaly/1", "electa", ["Take it on", "Page"]),
+        (Kind.REMINDER, "electa/false_alarm/1", "electa", ["Take it on", "Page"]),
+        (Kind.ALL_CLEAR, "electa/anomaly/1", "electa", ["Page"]),
+        (Kind.OVERDUE, "electa/overdue/1", "electa", ["Page"]),
+        (Kind.OPERATOR, "", "", []),
+    ],
+)
+def test_only_what_can_be_taken_on_has_such_a_link(
+    kind: Kind, incident: str, glider: str, labels: list[str]
+) -> None:
+    alert = replace(SAMPLES[Kind.ANOMALY](NOW), kind=kind, incident=incident, glider=glider)
+    channel = links.Linked(Kept(), "https://g.example.org", "k" * 40, "duty")
+    assert [label for label, _ in channel.links(alert)] == labels
+    assert (links.with_links(alert, ()) is alert) and links.with_links(
+        alert, channel.links(alert)
+    ).id == alert.id

@@ -157,7 +157,7 @@ def test_memory_is_bounded_and_survives_the_state_file() -> None:
     known = Baseline()
     for k in range(40):
         known = taught(healthy(30, seed=k, thruster=k / 40), known)
-    assert len(known.dives) <= healthy_baseline.MOST
+    assert len(known.dives) <= healthy_baseline.BASELINE_MOST
     assert not known.dives.flags.writeable
     again = codec.decode(codec.encode(known), Baseline)
     assert np.array_equal(again.dives, known.dives)

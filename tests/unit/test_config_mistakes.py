@@ -57,7 +57,7 @@ def problems(path: Path) -> list[str]:
         ("gliders: [electa]", "1: gliders: must be a section (`key: value` lines below it)"),
         (
             MINIMAL + "defaults: {zzzz: 1}",
-            "2: defaults.zzzz: unknown key (known are: adaptive, detection, estimator, normal_speed, "
+            "2: defaults.zzzz: unknown key (known are: adaptive, detection, estimator, health, normal_speed, "
             "overdue_hours, preset, reference, rules, surfacing_hours, unknown_dives, unknown_hours)",
         ),
         (MINIMAL + "defaults: {paths: [/d]}", "2: defaults.paths: unknown key (known are: adaptive"),

@@ -44,6 +44,12 @@ def test_not_nearer_to_the_bottom_than_the_altitude() -> None:
     assert found.notes == ("the bottom was at 60 m", "it would go to 62 m")
 
 
+def test_a_wrong_echo_in_ten_does_not_count() -> None:
+    times = [float(i) for i in range(20)]
+    assert advice(water_depth=(times, [20.0, *[60.0] * 19])).full.bottom == 50.0
+    assert advice(water_depth=(times, [*[20.0] * 5, *[60.0] * 15])).full.bottom == 10.0
+
+
 def test_the_altimeter_tells_the_bottom_too() -> None:
     found = advice(altitude=([5.0], [15.0]), depth=([0.0, 10.0], [40.0, 50.0]))
     assert found.full.bottom == 50.0

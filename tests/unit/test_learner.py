@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from gliderwatch.estimation.adaptive import Learner, step, warm_up
-from gliderwatch.estimation.dive_measurement import NEW_AFTER
-from gliderwatch.model import Assessment, Dive, DiveFeatures, Fix
+from gliderwatch.model import Assessment, Dive, DiveFeatures
 from gliderwatch.navigation.dives import Navigation, extend
 from gliderwatch.params import GliderParams, LearnerParams
 from missions import Leg, mission
@@ -131,33 +130,6 @@ def test_a_wrong_reference_gets_flag_2():
     _, told = run(these)
     assert [told[8].flag, told[9].flag] == [0, 2]
     assert told[9].p_e > told[9].gamma_f
-
-
-def test_another_deployment_starts_anew():
-    legs = dives()
-    later = [_moved_in_time(d, NEW_AFTER + 5 * 86400) for d in dives()[:2]]
-    state, told = run([*legs, *later])
-    assert state.begun == later[0].t_dive
-    assert told[len(legs)].reason == "warming up"
-
-
-def test_a_glider_that_was_carried_starts_anew():
-    these = dives()
-    far = replace(these[5], start=Fix(these[5].start.t, these[5].start.lat + 1.0, these[5].start.lon))
-    state, told = run([*these[:5], far])
-    assert state.begun == far.t_dive and told[-1].reason == "warming up"
-
-
-def _moved_in_time(dive: Dive, seconds: float) -> Dive:
-    fix = lambda f: Fix(f.t + seconds, f.lat, f.lon)  # noqa: E731
-    return replace(
-        dive,
-        t_dive=dive.t_dive + seconds,
-        t_surface=dive.t_surface + seconds,
-        start=fix(dive.start),
-        end=fix(dive.end),
-        track=replace(dive.track, t=dive.track.t + seconds),
-    )
 
 
 def test_functions_cover_the_way_and_the_old_ones_are_let_go():

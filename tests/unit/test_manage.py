@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sqlite3
+import time as clock
 from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, time
@@ -22,7 +23,7 @@ from gliderwatch.errors import GliderwatchError, StateError
 from gliderwatch.incidents.acknowledgement import acknowledge, with_mute
 from gliderwatch.incidents.notifications import NotificationState, Thread, as_notified, due_notifications
 from gliderwatch.incidents.send_schedule import QuietHours, Wait
-from gliderwatch.model import Kind, Severity
+from gliderwatch.model import Call, Fix, Kind, Severity
 from gliderwatch.params import Attention
 from gliderwatch.service import transaction
 from gliderwatch.service.routing import NOBODY, post_alerts
@@ -392,7 +393,9 @@ def test_a_state_of_an_earlier_release_is_read_but_not_written(config: Config, t
             "DROP TABLE mutes; DROP TABLE acks; DROP INDEX outbox_by_delivery; PRAGMA user_version = 2;"
             "ALTER TABLE outbox DROP COLUMN held_until; ALTER TABLE outbox DROP COLUMN escalates;"
             "ALTER TABLE outbox DROP COLUMN delivery; ALTER TABLE files DROP COLUMN hindrance;"
-            "DROP INDEX files_by_segment; DROP TABLE calls;"
+            "DROP INDEX files_by_segment; DROP TABLE calls; DROP TABLE health; DROP TABLE field_settings;"
+            "DROP TABLE field_batches; DROP TABLE field_checkpoints; DROP TABLE field_soundings;"
+            "DROP TABLE field_advice; DROP TABLE layers;"
         )
     assert [u.held_until for u in overview(config).undelivered] == [0.0]
     assert failing(path, NOW) == {}
@@ -401,3 +404,26 @@ def test_a_state_of_an_earlier_release_is_read_but_not_written(config: Config, t
         manage.mute_glider(config, "electa", NOW + 60, NOW)
     Store.open(path).close()
     assert manage.mute_glider(config, "electa", NOW + 60, NOW) == ["electa: muted until 2023-11-14 22:14 UTC"]
+
+
+def test_status_tells_what_a_later_call_told_and_the_files_that_never_came(
+    config: Config, tmp_path: Path
+) -> None:
+    now = clock.time()
+    call = Call(
+        "electa",
+        "electa.log",
+        now - 9000,
+        now - 8000,
+        fix=Fix(now - 9050, 61.5, 2.5),
+        waypoint=(61.25, 2.75),
+        reason="timeout expired",
+        segment="electa-2022-308-3-2",
+        short="01030002",
+        announced=("01030002.sbd", "01030001.tbd"),
+    )
+    with closing(Store.open(tmp_path / "state.sqlite")) as store:
+        store.calls.keep("/x/electa.log", call, "{}", now)
+    view = status_as_json(overview(config))["gliders"]["electa"]
+    assert view["last_call"]["fix"]["lat"] == 61.5 and view["last_call"]["because"] == "timeout expired"
+    assert [each["file"] for each in view["announced_and_not_come"]] == ["01030002.sbd"]

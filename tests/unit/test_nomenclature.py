@@ -15,6 +15,7 @@ from gliderwatch.estimation.kalman import JointParams
 from gliderwatch.estimation.modes import MODES, Mode
 from gliderwatch.estimation.speed_range import RangeParams
 from gliderwatch.estimation.verdict import SpeedParams
+from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.model import Assessment, NextSurfacing
 from gliderwatch.papers.learner import AdaptiveParams
 from gliderwatch.params import AnomalyRule, Attention, FalseAlarmRule, GliderParams, LearnerParams, RuleParams
@@ -74,6 +75,10 @@ def test_fields_of_an_assessment() -> None:
 
 def test_fields_of_the_next_surfacing() -> None:
     assert named("Next surfacing") == [field.name for field in fields(NextSurfacing)]
+
+
+def test_fields_of_the_advice_on_layers() -> None:
+    assert named("Layers") == [field.name for field in fields(LayerAdvice)]
 
 
 def test_parameters() -> None:

@@ -54,6 +54,16 @@ def test_what_was_open_is_over_when_another_deployment_begins():
     )
 
 
+def test_another_deployment_is_judged_as_if_it_were_the_first():
+    """Whichever estimator: nothing of the sea, the speed or the trim is carried over."""
+    for params in (GliderParams(), GliderParams(estimator="adaptive")):
+        second = [later(s, MONTH) for s in mission(HEALTHY)]
+        alone, after = run(second, params)[-1].state, run(mission(SLOW) + second, params)[-1].state
+        speeds = [state.assessment.speed for state in (after, alone)]
+        assert speeds[0] == pytest.approx(speeds[1], abs=1e-5)
+        assert after.memory.estimate.learner.begun == pytest.approx(alone.memory.estimate.learner.begun)
+
+
 def test_after_each_surfacing_the_next_one_is_expected():
     outcomes = run(mission(HEALTHY))
     dives = {a.t_dive: a for o in outcomes for a in o.assessments if a.lat is not None}

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gliderwatch.estimation.modes import FASTEST
+from gliderwatch.estimation.constants import FASTEST
 from gliderwatch.estimation.speed_range import Normal, RangeParams, learn, setting, speed_range
 from gliderwatch.model import DiveFeatures, readonly
 

@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gliderwatch.estimation.constants import RATIOS_FEW, RATIOS_KEPT
 from gliderwatch.estimation.kinematic_speed import (
-    FEW,
-    KEPT,
     KinematicSpeed,
     Ratios,
     kinematic_speed,
@@ -104,7 +103,7 @@ def test_no_vertical_speed_where_a_part_of_it_is_missing(change):
 
 def test_ratio_is_a_guess_until_three_dives_tell():
     known, features = Ratios(), DiveFeatures(**told(0.25, ratio=1.3))
-    for k in range(FEW):
+    for k in range(RATIOS_FEW):
         found = kinematic_speed(known, features)
         assert found.speed == pytest.approx(0.25 * 1.3 / 1.17), k
         assert found.sigma == pytest.approx(0.15 * found.speed)
@@ -124,15 +123,15 @@ def test_scatter_of_the_ratios_is_their_uncertainty():
 
 def test_only_the_last_dives_count():
     known = Ratios()
-    for k in range(2 * KEPT):
-        known = learn(known, telling_dive(0.25, ratio=1.0 if k < KEPT else 1.3), 0.25)
-    assert len(known.vertical) == KEPT
+    for k in range(2 * RATIOS_KEPT):
+        known = learn(known, telling_dive(0.25, ratio=1.0 if k < RATIOS_KEPT else 1.3), 0.25)
+    assert len(known.vertical) == RATIOS_KEPT
     assert kinematic_speed(known, telling_dive(0.25, ratio=1.3)).speed == pytest.approx(0.25)
 
 
 def test_mean_of_the_glider_is_not_used_before_three_healthy_dives():
     known, features = Ratios(), DiveFeatures(**told(0.0, onboard=0.26))
-    for _ in range(FEW):
+    for _ in range(RATIOS_FEW):
         assert kinematic_speed(known, features) is None
         known = learn(known, features, 0.25)
     found = kinematic_speed(known, features)
@@ -140,7 +139,7 @@ def test_mean_of_the_glider_is_not_used_before_three_healthy_dives():
 
 
 def test_vertical_speed_comes_first():
-    known = Ratios((1.0,) * FEW, (1.0,) * FEW)
+    known = Ratios((1.0,) * RATIOS_FEW, (1.0,) * RATIOS_FEW)
     assert kinematic_speed(
         known, replace(telling_dive(0.25, ratio=1.0), onboard_speed=0.4)
     ).speed == pytest.approx(0.25)
@@ -150,7 +149,7 @@ def test_vertical_speed_comes_first():
 @pytest.mark.parametrize("speed", [0.0, -0.2])
 def test_speed_that_cannot_be_tells_nothing_and_teaches_nothing(speed):
     features = DiveFeatures(**told(0.0, onboard=speed))
-    assert kinematic_speed(Ratios(onboard=(1.0,) * FEW), features) is None
+    assert kinematic_speed(Ratios(onboard=(1.0,) * RATIOS_FEW), features) is None
     assert learn(Ratios(), features, 0.25) == Ratios()
 
 

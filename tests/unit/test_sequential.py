@@ -3,8 +3,8 @@ import math
 import numpy as np
 import pytest
 
+from gliderwatch.estimation.constants import WINDOW
 from gliderwatch.estimation.step_test import (
-    WINDOW,
     Bank,
     Update,
     advance,

@@ -6,8 +6,8 @@ import pytest
 
 from gliderwatch.estimation.speed_range import RangeParams
 from gliderwatch.estimation.verdict import SpeedParams, SpeedState, step
-from gliderwatch.model import Fix, Flag, readonly
-from joint_support import DAY, HOUR, LAT, LON, START, Way, mission, ways
+from gliderwatch.model import Flag, readonly
+from joint_support import Way, mission, ways
 
 PARAMS, NOTHING = SpeedParams(), SpeedState()
 
@@ -146,21 +146,6 @@ def test_thruster_on_is_not_faster_than_ever():
     _, unexplained = run(mission([*sailing, *[replace(w, thruster=0.0) for w in pushed]]))
     assert flags(unexplained[8:11]) == [None, None, Flag.NORMAL]  # a new way of flying once three dives agree
     assert "faster than before" in unexplained[8].reason
-
-
-def test_new_deployment_forgets_what_is_normal():
-    state, _ = run(mission([Way()] * 10))
-    dive = mission([Way(speed=0.4, own=0.43)])[0]
-    t = START + 10 * DAY
-    later = replace(
-        dive,
-        start=Fix(t, LAT, LON),
-        end=Fix(t + 3 * HOUR, LAT, LON),
-        track=replace(dive.track, t=readonly(dive.track.t + 10 * DAY)),
-    )
-    after, verdict = step(state, later, PARAMS)
-    assert verdict.flag is Flag.NORMAL
-    assert len(after.normal.speeds) == 1
 
 
 def test_range_can_be_tightened():

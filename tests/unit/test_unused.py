@@ -18,8 +18,6 @@ ALLOWED = {
     "is_sent": "benchmarks/sensors.py asks which sensors a mission has",
     "with_fault": "benchmarks/seas.py puts faults into missions by it",
     "Sent.computer": "rules of health read it next",
-    "Clock.mission_time": "rules of health read it next",
-    "Counts.oddities": "rules of health read it next",
     "_Warnings.emit": "logging calls it",
     "_Handler.on_any_event": "watchdog calls it",
 }

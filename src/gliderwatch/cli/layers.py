@@ -151,7 +151,7 @@ def _summary(preset: Preset, run: Run) -> dict[str, Any]:
 
 def _draw(path: Path, preset: Preset, run: Run) -> None:
     """Depth against value, and both against time, as the figures of 004 have them."""
-    from gliderwatch.figures.plots import library
+    from gliderwatch.figures.plots import as_svg, library
 
     figure = library().figure.Figure(figsize=(14, 4.5), layout="constrained")
     profile, way, series = figure.subplots(1, 3)
@@ -171,4 +171,4 @@ def _draw(path: Path, preset: Preset, run: Run) -> None:
     for axes in (profile, way):
         axes.invert_yaxis()
     profile.legend(loc="lower right")
-    figure.savefig(path)
+    path.write_text(as_svg(figure), encoding="utf-8")

@@ -30,6 +30,13 @@ from gliderwatch.errors import GliderwatchError
     metavar="CAUSE@DAY",
     help="With --logs: the last glider aborts by then, as LEAK@2, and waits at its prompt.",
 )
+@click.option(
+    "--ailment",
+    "ailments",
+    multiple=True,
+    metavar="NAME:SIZE@DAY",
+    help="Of the last glider, as slow_leak:0.5@3, battery:6@5 or device_error@2.",
+)
 @click.option("--live", is_flag=True, help="Let the files come as time passes; OUT may be in use.")
 @click.option("--speedup", type=click.FloatRange(0, min_open=True), help="With --live: how much faster (1).")
 def simulate(
@@ -43,6 +50,7 @@ def simulate(
     full_rate: bool,
     logs: bool,
     abort: str | None,
+    ailments: tuple[str, ...],
     live: bool,
     speedup: float | None,
 ) -> None:
@@ -60,4 +68,5 @@ def simulate(
         raise GliderwatchError(f"{out} is not empty: give another folder, or remove it")
     scenarios = job.gliders(name, gliders, days, seed, faults, full_rate)
     rates = job.call_rates(abort) if logs else None
-    job.run(job.Job(out, scenarios, compressed, (speedup or 1.0) if live else None, rates))
+    ill = job.ailments(ailments, scenarios[-1])
+    job.run(job.Job(out, scenarios, compressed, (speedup or 1.0) if live else None, rates, ill))

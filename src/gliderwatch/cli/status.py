@@ -11,14 +11,15 @@ from typing import Any
 from gliderwatch.cli.manage import reading, writing
 from gliderwatch.config import Config, linked_gliders
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.incidents.acknowledgement import Ack, Acks, acknowledge, with_mute
+from gliderwatch.incidents.acknowledgement import Ack, Acks, acknowledge, acknowledge_thread, with_mute
 from gliderwatch.incidents.constants import GONE, RECENT
 from gliderwatch.incidents.notices import Acknowledged, Irregularity, Notice
+from gliderwatch.incidents.notifications import OpenThread, open_threads
 from gliderwatch.incidents.overdue import ExpectedCall, expected_call, guess, is_launched
 from gliderwatch.messages import irregularity_text
 from gliderwatch.messages.formatting import clean
 from gliderwatch.messages.notice_text import render
-from gliderwatch.model import Assessment, Incident, Kind, NextSurfacing, Severity
+from gliderwatch.model import Assessment, Call, Incident, Kind, NextSurfacing, Severity
 from gliderwatch.params import Attention
 from gliderwatch.service.jsonl import assessment_line, iso
 from gliderwatch.service.liveness import STALE, is_held, seconds_silent
@@ -32,15 +33,27 @@ from gliderwatch.store.state_file import File, Status, Store, Undelivered
 
 @dataclass(frozen=True, slots=True)
 class IncidentEntry:
-    """An incident and its acknowledgement, if there is one."""
+    """An incident, or what goes on and is none of dives, and its acknowledgement, if there is one."""
 
-    incident: Incident
+    incident: Incident | OpenThread
     ack: Ack | None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it goes on."""
+        return isinstance(self.incident, OpenThread) or self.incident.cleared_at is None
 
     @property
     def is_quiet(self) -> bool:
         """Whether nobody is reminded of it because of the acknowledgement."""
-        return self.ack is not None and self.ack.holds(self.incident)
+        return self.ack is not None and _holds(self.ack, self.incident)
+
+
+def _holds(ack: Ack, incident: Incident | OpenThread) -> bool:
+    """Whether what was acknowledged has not grown worse since."""
+    if isinstance(incident, OpenThread):
+        return incident.severity <= ack.severity
+    return ack.holds(incident)
 
 
 def incident_entries(
@@ -63,7 +76,8 @@ def incident_entries(
 def _of(store: Store, glider: str, every: bool) -> list[IncidentEntry]:
     acks = store.notes.acks(glider)
     found = (i for i in store.incidents(glider) if every or i.cleared_at is None)
-    return [IncidentEntry(i, acks.get(i.id)) for i in found]
+    entries = [IncidentEntry(i, acks.get(i.id)) for i in found]
+    return entries + [IncidentEntry(t, acks.get(t.id)) for t in open_threads(store.said(glider))]
 
 
 def acknowledge_incident(
@@ -80,10 +94,14 @@ def acknowledge_incident(
         before = noted.ack
         if noted.is_quiet and before is not None and (before.by, before.note) == (by, note):
             return noted, False
-        made = acknowledge(noted.incident, by, note, now)
+        i = noted.incident
+        if isinstance(i, OpenThread):
+            made = acknowledge_thread(i.id, i.severity, by, note, now)
+        else:
+            made = acknowledge(i, by, note, now)
         store.notes.acknowledge(noted.incident.glider, made)
         withdraw_answered(store, noted.incident.glider, now)
-        _notify_others(store, config, noted.incident, Acknowledged(noted.incident, by, note, False), now)
+        _notify_others(store, config, noted.incident, by, note, now, is_undone=False)
     return IncidentEntry(noted.incident, made), True
 
 
@@ -97,7 +115,7 @@ def give_incident_back(config: Config, wanted: str, by: str, note: str, now: flo
         if noted.ack is None:
             raise GliderwatchError(f"nobody has acknowledged {clean(noted.incident.id)}: nothing to undo")
         store.notes.give_back(noted.incident.id)
-        _notify_others(store, config, noted.incident, Acknowledged(noted.incident, by, note, True), now)
+        _notify_others(store, config, noted.incident, by, note, now, is_undone=True)
     return IncidentEntry(noted.incident, None)
 
 
@@ -105,27 +123,35 @@ def _open_entry(store: Store, wanted: str) -> IncidentEntry:
     """The open incident of an id, or the only one of a glider. Raises GliderwatchError."""
     known = [noted for glider in store.gliders() for noted in _of(store, glider, every=True)]
     wanted = wanted.strip()
-    found = [n for n in known if n.incident.glider == wanted.lower() and n.incident.cleared_at is None]
+    found = [n for n in known if n.incident.glider == wanted.lower() and n.is_open]
     if len(found) == 1:
         return found[0]
     noted = next((n for n in known if n.incident.id == wanted), None)
-    if noted is None or noted.incident.cleared_at is not None:
+    if noted is None or not noted.is_open:
         raise GliderwatchError(_refusal(wanted, noted, known))
     return noted
 
 
 def _notify_others(
-    store: Store, config: Config, incident: Incident, content: Acknowledged, now: float
+    store: Store,
+    config: Config,
+    incident: Incident | OpenThread,
+    by: str,
+    note: str,
+    now: float,
+    *,
+    is_undone: bool,
 ) -> None:
     """Put into the outbox that somebody is on an incident, or no more, for all who hear of it."""
-    what, kind, info = "undone" if content.is_undone else "acknowledged", Kind.ACKNOWLEDGED, Severity.INFO
+    content = Acknowledged(incident.id, incident.kind, incident.since, by, note, is_undone)
+    what, kind, info = "undone" if is_undone else "acknowledged", Kind.ACKNOWLEDGED, Severity.INFO
     identity, glider = f"{incident.id}/{what}/{now:.3f}", incident.glider
     alert = render(Notice(identity, incident.id, glider, now, kind, info, incident.severity, content))
     post_alert(store, alert, channels(alert, config), now)
 
 
 def _refusal(wanted: str, noted: IncidentEntry | None, known: list[IncidentEntry]) -> str:
-    opened = [n.incident for n in known if n.incident.cleared_at is None]
+    opened = [n.incident for n in known if n.is_open]
     mine = [i for i in opened if i.glider == wanted.lower()]
     if len(mine) > 1:
         wrong = f"several incidents of {clean(wanted)} are open: name one by its id"
@@ -140,24 +166,29 @@ def _refusal(wanted: str, noted: IncidentEntry | None, known: list[IncidentEntry
 def incidents_as_json(noted: IncidentEntry) -> dict[str, Any]:
     """An incident for machines."""
     i = noted.incident
-    return {
+    common = {
         "id": i.id,
         "glider": i.glider,
         "kind": str(i.kind),
         "severity": i.severity.name.lower(),
         "since": iso(i.since),
+        "acknowledged": None if noted.ack is None else ack_json(noted.ack, i),
+    }
+    if isinstance(i, OpenThread):
+        return {**common, "about": i.about}
+    return {
+        **common,
         "opened_at": iso(i.opened_at),
         "cleared_at": None if i.cleared_at is None else iso(i.cleared_at),
         "dives": i.dives,
         "worst": _dive(i.worst),
         "last": _dive(i.last),
-        "acknowledged": None if noted.ack is None else ack_json(noted.ack, i),
     }
 
 
-def ack_json(made: Ack, incident: Incident) -> dict[str, Any]:
+def ack_json(made: Ack, incident: Incident | OpenThread) -> dict[str, Any]:
     """An acknowledgement for machines; `worse`: the incident has grown worse since."""
-    return {"by": made.by, "note": made.note, "at": iso(made.at), "worse": not made.holds(incident)}
+    return {"by": made.by, "note": made.note, "at": iso(made.at), "worse": not _holds(made, incident)}
 
 
 def _dive(a: Assessment) -> dict[str, Any]:
@@ -175,6 +206,7 @@ def _dive(a: Assessment) -> dict[str, Any]:
 # ----------------------------------------
 # What `gliderwatch status` tells: is the daemon alive, how is each glider, what is in the way.
 
+HOUR = 3600.0
 WEEK = 7 * 86400.0
 """Seconds for which `status` tells what a channel refused for good."""
 
@@ -184,7 +216,9 @@ class GliderStatus:
     """One glider: its last dive that ended, the open incidents, how many segments and dives are known.
 
     ``expected`` and ``awaited``: the next surfacing, as known ``at`` a time (s). ``acks``: who has taken
-    incidents on. ``irregularities`` of its files in the last 30 days.
+    incidents on. ``irregularities`` of its files in the last 30 days. ``threads`` are what goes on and is no
+    incident of dives, ``not_come`` the files that it announced in a call (its time, s) and that never came.
+    ``call`` is its last, where that is later than its last dive that ended: what it told there is news.
     """
 
     name: str
@@ -199,6 +233,9 @@ class GliderStatus:
     awaited: ExpectedCall | None = None
     acks: Acks = field(default_factory=dict)
     irregularities: tuple[Irregularity, ...] = ()
+    threads: tuple[OpenThread, ...] = ()
+    not_come: tuple[tuple[float, str], ...] = ()
+    call: Call | None = None
 
     @property
     def is_over(self) -> bool:
@@ -292,8 +329,43 @@ def _glider(store: Store, name: str, config: Config, now: float) -> GliderStatus
     configured = name in config.gliders
     recent = tuple(i for i in known.irregularities(now) if now - i.t < GONE)
     return GliderStatus(
-        name, configured, segments, dives, latest, incidents, now, attention, expected, call, acks, recent
+        name,
+        configured,
+        segments,
+        dives,
+        latest,
+        incidents,
+        now,
+        attention,
+        expected,
+        call,
+        acks,
+        recent,
+        open_threads(store.said(name)),
+        known.not_come(now - GONE, now),
+        _news(known.calls(now - GONE), latest),
     )
+
+
+def _news(calls: tuple[Call, ...], latest: Assessment | None) -> Call | None:
+    """The last call, where it tells of a fix that is later than the last dive that ended."""
+    last = calls[-1] if calls else None
+    if last is None or last.fix is None or (latest is not None and last.fix.t <= latest.t_surface + HOUR):
+        return None
+    return last
+
+
+def _call_as_json(call: Call | None) -> dict[str, Any] | None:
+    """What a glider told of itself in a call, for machines."""
+    if call is None or call.fix is None:
+        return None
+    return {
+        "at": iso(call.last_t),
+        "fix": {"at": iso(call.fix.t), "lat": call.fix.lat, "lon": call.fix.lon},
+        "waypoint": None if call.waypoint is None else {"lat": call.waypoint[0], "lon": call.waypoint[1]},
+        "because": call.reason or None,
+        "mission": call.mission or None,
+    }
 
 
 def status_as_json(view: Overview) -> dict[str, Any]:
@@ -311,6 +383,9 @@ def status_as_json(view: Overview) -> dict[str, Any]:
                 "irregularities": [
                     {"since": iso(i.t), "title": irregularity_text.title(i)} for i in g.irregularities
                 ],
+                "open": [incidents_as_json(IncidentEntry(t, g.acks.get(t.id))) for t in g.threads],
+                "last_call": _call_as_json(g.call),
+                "announced_and_not_come": [{"call": iso(t), "file": name} for t, name in g.not_come],
                 **_silence(g),
             }
             for g in view.gliders

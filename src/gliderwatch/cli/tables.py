@@ -13,8 +13,9 @@ from rich.text import Text
 from gliderwatch.cli.status import GliderStatus, IncidentEntry, Overview
 from gliderwatch.config import Problem
 from gliderwatch.incidents.acknowledgement import Ack
+from gliderwatch.incidents.notifications import OpenThread
 from gliderwatch.messages import irregularity_text
-from gliderwatch.messages.formatting import clean, duration, utc
+from gliderwatch.messages.formatting import clean, duration, place, utc
 from gliderwatch.model import Alert, Assessment, Flag, Incident, Kind, Severity
 from gliderwatch.service.jsonl import iso
 from gliderwatch.store.state_file import File, Status
@@ -132,11 +133,7 @@ def status(view: Overview, console: Console) -> None:
             taken_on = "" if ack is None else f", {acknowledged(ack, i)}"
             console.print(Text(text + taken_on, style=_STYLES[i.severity]))
     for glider in view.gliders:
-        for each in glider.irregularities:
-            console.print(
-                Text(f"since {utc(each.t)}: {clean(irregularity_text.title(each))}", style="yellow"),
-                soft_wrap=True,
-            )
+        _of_files_and_calls(glider, console)
     files(view.files, [*view.waiting, *view.quarantined], console)
     for name, link in view.links.items():
         text = f"{clean(name, 30)}: {clean(str(link), 600)} ({clean(link.cure, 600)})"
@@ -147,6 +144,28 @@ def status(view: Overview, console: Console) -> None:
             Text(f"gliders not in the configuration: {names} ({len(view.unknown)} files left alone)")
         )
     _messages(view, console)
+
+
+def _of_files_and_calls(glider: GliderStatus, console: Console) -> None:
+    """What goes on beside incidents of dives, and what is wrong with the glider's files."""
+    name = glider.name
+    lines = [
+        (_STYLES[t.severity], f"{name}: {t.kind} since {utc(t.since)}: {t.about}") for t in glider.threads
+    ]
+    if (call := glider.call) is not None and call.fix is not None:
+        bound = "" if call.waypoint is None else f", bound for {place(*call.waypoint)}"
+        because = f", at the surface because {call.reason}" if call.reason else ""
+        where = f"{name}: at {place(call.fix.lat, call.fix.lon)} by its call of {utc(call.last_t)}"
+        lines.append(("", where + bound + because))
+    lines += [
+        ("yellow", f"{name}: {file} was announced in the call of {utc(t)} and never came")
+        for t, file in glider.not_come
+    ]
+    lines += [
+        ("yellow", f"since {utc(each.t)}: {irregularity_text.title(each)}") for each in glider.irregularities
+    ]
+    for style, text in lines:
+        console.print(Text(clean(text), style=style), soft_wrap=True)
 
 
 def _messages(view: Overview, console: Console) -> None:
@@ -211,6 +230,15 @@ def incidents(found: Sequence[IncidentEntry], console: Console) -> None:
     """Incidents, a few lines each: the id, since when, how bad, and who has taken it on; 80 columns."""
     for noted in found:
         i, ack = noted.incident, noted.ack
+        if isinstance(i, OpenThread):
+            console.print(Text(clean(i.id), style=_STYLES[i.severity]), soft_wrap=True)
+            console.print(Text(f"  {i.kind}, {i.severity.name.lower()}, open"))
+            console.print(Text(f"  since {utc(i.since)}: {clean(i.about)}"), soft_wrap=True)
+            if ack is not None:
+                worse = "" if noted.is_quiet else ", WORSE SINCE"
+                note = f": {clean(ack.note)}" if ack.note else ""
+                console.print(Text(f"  acknowledged by {clean(ack.by, 40)}{worse}{note}, {utc(ack.at)}"))
+            continue
         over = "open" if i.cleared_at is None else f"cleared {utc(i.cleared_at)}"
         style = "dim" if i.cleared_at is not None else _STYLES[i.severity]
         console.print(Text(clean(i.id), style=style), soft_wrap=True)

@@ -29,9 +29,10 @@ def web(config_path: Path, link: str | None, recipient: str | None) -> None:
     try:
         import uvicorn
 
-        from gliderwatch.web import app, links
+        from gliderwatch.delivery import links
+        from gliderwatch.web import app
     except ImportError as error:
-        raise GliderwatchError(f"{error.name} is not installed: pip install 'gliderwatch[web]'") from None
+        raise GliderwatchError(f"{error.name} is not installed: docs/install.md says how") from None
     if link is not None:
         if recipient is None or config.web.public_url is None:
             raise click.UsageError("--link needs --for NAME, and web.public_url in the configuration")

@@ -14,6 +14,7 @@ from pydantic import Field, PrivateAttr, SecretStr, TypeAdapter, ValidationError
 from gliderwatch.config import secrets
 from gliderwatch.config.document import Document, Problem, nearest, read, shown
 from gliderwatch.config.fields import GliderName, Name, Section
+from gliderwatch.config.health import limits_of
 from gliderwatch.config.schema import (
     Channel,
     Dockserver,
@@ -31,6 +32,7 @@ from gliderwatch.config.schema import (
     Web,
 )
 from gliderwatch.errors import ConfigError
+from gliderwatch.health.rule import Limits
 from gliderwatch.params import Attention, GliderParams
 
 # ----------------------------------------
@@ -79,6 +81,10 @@ class Config(Section):
             settings.unknown_hours,
             settings.unknown_dives,
         )
+
+    def health(self, name: str) -> Mapping[str, Limits]:
+        """The limits of the rules of health of a glider, but for rules that are off."""
+        return limits_of(self._of(name).health, self.gliders.get(name.lower(), Glider()).recovery)
 
     def locate(self, key: str) -> int:
         """The line of a dotted key (`channels.mail.url`, `dockserver.roots.0`) in the file."""

@@ -25,11 +25,12 @@ from gliderwatch.config.fields import (
     Url,
     Zone,
 )
+from gliderwatch.config.health import Health
 from gliderwatch.fleet.constants import APART
 from gliderwatch.incidents import send_schedule
 from gliderwatch.model import Severity
 from gliderwatch.params import AnomalyRule, Attention, FalseAlarmRule, GliderParams, LearnerParams, RuleParams
-from gliderwatch.sea.ocean_field import STALE
+from gliderwatch.sea.constants import STALE
 
 # ----------------------------------------
 # The sections of the settings that are of gliders, as frozen pydantic models.
@@ -191,6 +192,7 @@ class Settings(Preset):
 
     preset: str | None = Field(default=None, description="Name of a preset; keys given here win over it.")
     rules: Rules = Field(default=Rules(), description="When to alert.")
+    health: Health = Field(default=Health(), description="Rules of health.")
 
     def params(self) -> GliderParams:
         """As the values that the pipeline takes."""
@@ -262,6 +264,11 @@ class Glider(Settings):
         default=None,
         description="No messages about it until then; it is still assessed. A date (`2026-12-01`: "
         "messages from 00:00 UTC on) or a date and time in UTC (`2026-12-01 14:30`).",
+    )
+    recovery: Moment | None = Field(
+        default=None,
+        description="When it is planned to be taken out of the water; the end of its battery is held against "
+        "that. A date (`2026-12-01`) or a date and time in UTC.",
     )
     recovered: Switch = Field(
         default=False, description="It is out of the water: no messages about it, and it is not overdue."
@@ -483,7 +490,8 @@ class Web(Section):
     )
     public_url: AnyHttpUrl | None = Field(
         default=None,
-        description="URL under which people reach it, through a tunnel or a reverse proxy.",
+        description="URL under which people reach it, through a tunnel or a reverse proxy: messages then end "
+        "with links to the page, and to acknowledge; null: without.",
     )
     link_hours: Annotated[Number, Field(gt=0, le=720)] = Field(
         default=48.0, description="Hours for which a link acknowledges."

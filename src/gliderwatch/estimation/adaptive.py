@@ -13,6 +13,7 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
+from gliderwatch.estimation.constants import FORGOTTEN, STALE, WARM_UP
 from gliderwatch.estimation.speed_range import Normal, RangeParams, learn, setting, speed_range
 from gliderwatch.estimation.unassessed import Reference, unassessed
 from gliderwatch.model import Array, Assessment, Current, Dive, Fix, Flag, Track, readonly
@@ -22,15 +23,6 @@ from gliderwatch.papers.basis import new_centres, phi
 from gliderwatch.papers.flags import FlowMaxima, flag, p_e, update
 from gliderwatch.papers.learner import AdaptiveInfo, AdaptiveParams, AdaptiveState, advance, init, with_basis
 from gliderwatch.params import GliderParams
-
-WARM_UP = 3.0
-"""Time constants K/gamma of the speed law: by then 95 % of an error of the first guess is gone."""
-STALE = 12 * 3600.0
-"""Seconds without a usable dive after which the sea may be another: the learner warms up anew."""
-LATEST = 12 * 3600.0
-"""Seconds for which the current of an earlier dive stands in for one that has not come yet."""
-FORGOTTEN = 6.0
-"""Widths sigma behind the glider at which a basis function that was placed on the way is let go."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +127,7 @@ def _reference(state: Learner, dive: Dive) -> tuple[Current | None, bool]:
     """The current to compare with, and whether it is that of an earlier dive, for want of its own."""
     if dive.current is not None:
         return dive.current, False
-    recent = state.current is not None and dive.t_surface - state.current_t < LATEST
+    recent = state.current is not None and dive.t_surface - state.current_t < STALE
     return (state.current, True) if recent else (None, False)
 
 

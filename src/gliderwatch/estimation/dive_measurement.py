@@ -8,6 +8,36 @@ from statistics import median
 
 import numpy as np
 
+from gliderwatch.estimation.constants import (
+    ASSUMED_ERROR,
+    ASSUMED_LENGTH,
+    CARRIED,
+    CARRIED_FOR,
+    COMMANDED_ERROR,
+    COMPASS_ERROR,
+    DRAG_BY_LIFT,
+    DRAG_SLIP,
+    FASTEST,
+    FLATTEST_GLIDE,
+    GAP,
+    GAP_IN_CADENCES,
+    GPS_ERROR,
+    NEW_AFTER,
+    PROVISIONAL,
+    RECKONED_ERROR,
+    REPORTED,
+    SHAPE_ERROR,
+    SLOWEST,
+    STEEPEST_GLIDE,
+    STEERED_ERROR,
+    STRAIGHT,
+    SURFACE_FLOW,
+    SWING,
+    TURNING_ERROR,
+    UNEVEN,
+    UNSEEN,
+    USUAL_PITCH,
+)
 from gliderwatch.estimation.kinematic_speed import KinematicSpeed
 from gliderwatch.model import Array, Dive, Fix, readonly
 from gliderwatch.navigation.geodesy import displacement
@@ -19,41 +49,6 @@ from gliderwatch.navigation.geodesy import displacement
 # mean flow, V the horizontal speed through the water and h the mean of the heading vector (shorter than
 # 1 where it turned or drifted at the surface). On board it reckons with a speed W of its own, from depth
 # rate and pitch, and reports what is left as depth-averaged current: c = g - W h.
-
-GPS = 5.0
-"""Metres, a component: error of a fix."""
-SURFACE_FLOW = 0.15
-"""m/s, a component: by how much the drift at the surface differs from the flow below."""
-CONTROL = 0.1
-"""rad: how much a glider swings about its course."""
-COMPASS = 0.02
-"""rad: how well the headings in the files are those that the glider reckoned with; mostly declination."""
-COMMANDED = 0.08
-"""rad: how far the mean of the commanded headings of a dive is from that of measured ones, where only they
-are sent: 0.04 to 0.09 on the four missions that have both (robust standard deviations)."""
-LIKELY, ASSUMED = 0.92, 0.2
-"""Usual length of the mean heading vector of a dive whose headings are not known, and its standard error."""
-STRAIGHT, TURNING = 0.9, 0.5
-"""Length of the mean of the few headings there are, below which it turned, and the standard error then."""
-STEERED = 0.1
-"""The same error where the commanded headings tell the length."""
-SHAPE = 0.03
-"""The same error where the dead-reckoned way tells the length."""
-UNEVEN = 0.05
-"""Part of the speed by which dives and climbs differ: matters where the heading differs between them too."""
-UNSEEN = 0.5
-"""Usual error of the mean heading vector over hours of which no data have come."""
-REPORTED, PROVISIONAL = 0.006, 0.02
-"""m/s, a component: error of a current as reckoning, corrected and as first published."""
-DRAG_BY_LIFT = 0.02
-"""C_D0 / a of a Slocum: parasite drag by slope of the lift (Merckelbach et al. 2019: 0.15 and 7.5 1/rad)."""
-USUAL_PITCH, FLATTEST, STEEPEST = 0.45, 0.3, 1.0
-"""rad: pitch of a glide where none is reported, and between which pitches the formula for slip is used."""
-NEW_AFTER, CARRIED = 3 * 86400.0, 3.0
-"""Seconds between two dives, or m/s between their fixes, after which sea and glider are unknown again: the
-glider was recovered, or carried faster than any drift."""
-GAP, GAP_IN_CADENCES = 600.0, 2.5
-"""A gap between headings is one where it is longer than this in seconds, and in usual spacings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +129,9 @@ def observe(dive: Dive) -> Observation:
         start=float(track.t[0]),
         end=float(track.t[-1]),
         ground=readonly(ground),
-        ground_cov=readonly((2 * (GPS / interval) ** 2 + ((1 - flown) * SURFACE_FLOW) ** 2) * np.eye(2)),
+        ground_cov=readonly(
+            (2 * (GPS_ERROR / interval) ** 2 + ((1 - flown) * SURFACE_FLOW) ** 2) * np.eye(2)
+        ),
         heading=readonly(heading),
         heading_cov=readonly(
             (
@@ -147,7 +144,7 @@ def observe(dive: Dive) -> Observation:
         ),
         is_free=_is_free(dive),
         current=None if current is None else readonly([current.u, current.v]),
-        current_sigma=math.hypot(error, 2 * GPS / interval),
+        current_sigma=math.hypot(error, 2 * GPS_ERROR / interval),
         slip=_slip(dive),
         unseen=_unseen(dt[flying]),
     )
@@ -174,7 +171,7 @@ def are_apart(end: Fix, start: Fix) -> bool:
     """
     gap = start.t - end.t
     moved = float(np.hypot(*displacement(start.lat, start.lon, end.lat, end.lon)))
-    return gap > NEW_AFTER or moved > CARRIED * max(gap, 600.0)
+    return gap > NEW_AFTER or moved > CARRIED * max(gap, CARRIED_FOR)
 
 
 def _is_free(dive: Dive) -> bool:
@@ -203,7 +200,7 @@ def _directed(vectors: Array, velocities: Array, share: Array, dive: Dive) -> tu
     flown = float(share.sum())
     if dive.current is None:
         # the way has the current in it, the course need not be flown as commanded
-        error = COMMANDED if commanded else 0.3 if reckoned else 1.0
+        error = COMMANDED_ERROR if commanded else RECKONED_ERROR if reckoned else 1.0
         return vectors, np.asarray((error * flown) ** 2 * np.eye(2))
     through = velocities - np.array([dive.current.u, dive.current.v])
     mean = share @ through / flown
@@ -214,11 +211,11 @@ def _directed(vectors: Array, velocities: Array, share: Array, dive: Dive) -> tu
     seen = float(np.hypot(*(share @ vectors))) / flown
     if reckoned:
         speeds = np.hypot(*through.T)
-        length, error = rest / max(float(share @ speeds) / flown, rest), SHAPE
+        length, error = rest / max(float(share @ speeds) / flown, rest), SHAPE_ERROR
     elif commanded:
-        length, error = seen, STEERED if seen > STRAIGHT else TURNING
+        length, error = seen, STEERED_ERROR if seen > STRAIGHT else TURNING_ERROR
     else:
-        length, error = LIKELY * seen, ASSUMED if seen > STRAIGHT else TURNING
+        length, error = ASSUMED_LENGTH * seen, ASSUMED_ERROR if seen > STRAIGHT else TURNING_ERROR
     error *= flown
     return np.tile(length * along, (len(vectors), 1)), np.asarray(error**2 * np.outer(along, along))
 
@@ -234,9 +231,9 @@ def _heading_cov(vectors: Array, share: Array, dive: Dive, interval: float) -> A
     flown = float(share.sum())
     mean = share @ vectors / flown
     steps = np.diff(vectors, axis=0)
-    swings = 2 * (steps.T @ steps + CONTROL**2 * np.eye(2)) / (len(steps) + 1)
+    swings = 2 * (steps.T @ steps + SWING**2 * np.eye(2)) / (len(steps) + 1)
     aside = np.array([-mean[1], mean[0]])
-    turned = (COMPASS * flown) ** 2 * np.outer(aside, aside)
+    turned = (COMPASS_ERROR * flown) ** 2 * np.outer(aside, aside)
     uneven = (UNEVEN * flown) ** 2 * max(0.0, 1 - float(mean @ mean)) / 2
     return np.asarray(
         swings * float(share @ share) + turned + uneven * np.eye(2) + _missing(dive, interval, 0.0)
@@ -247,7 +244,7 @@ def _missing(dive: Dive, interval: float, flown: float) -> Array:
     """Covariance of the mean heading vector by hours of which no data came, and by the compass on a part
     ``flown``."""
     missing = UNSEEN * (dive.features.unobserved / 3600) * 3600 / interval
-    return np.asarray((missing**2 + (COMPASS * flown) ** 2) * np.eye(2))
+    return np.asarray((missing**2 + (COMPASS_ERROR * flown) ** 2) * np.eye(2))
 
 
 def _slip(dive: Dive) -> float:
@@ -263,7 +260,7 @@ def _slip(dive: Dive) -> float:
 
 def slip_at(pitch: float) -> float:
     """The part of W that the angle of attack takes at a pitch (rad)."""
-    return DRAG_BY_LIFT / math.sin(min(max(pitch, FLATTEST), STEEPEST)) ** 2
+    return DRAG_BY_LIFT / math.sin(min(max(pitch, FLATTEST_GLIDE), STEEPEST_GLIDE)) ** 2
 
 
 def _unseen(dt: Array) -> float:
@@ -291,10 +288,6 @@ OWN, SLIP, SIDE = -3, -2, -1
 """Places in the state of W (m/s), and of slip and side (parts of W)."""
 SHOWN = 5
 """How many numbers of the state a dive shows: those at its end."""
-SLOWEST, FASTEST = 0.02, 1.3
-"""m/s: between these is the speed of any glider through the water."""
-DRAG_SLIP = 0.9
-"""Slip that drag adds where it takes all of the speed, as part of W."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -380,5 +373,9 @@ def expected(x: Array, measured: Measured) -> tuple[Array, Array, Array]:
     noise[:, :4, :4] += along[:, :, None] * along[:, None, :]
     if measured.tells is not None:
         noise[:, 4, 4] = measured.tells.sigma**2
-    there = [0, 1, *([2, 3] if measured.has_current else []), *([4] if measured.tells is not None else [])]
-    return np.concatenate(values, axis=1)[:, there], slope[:, there], noise[:, there][:, :, there]
+    found = np.concatenate(values, axis=1)
+    if measured.has_current:
+        m = 4 if measured.tells is None else 5
+        return found[:, :m], slope[:, :m], noise[:, :m, :m]
+    there = [0, 1] if measured.tells is None else [0, 1, 4]
+    return found[:, there], slope[:, there], noise[:, there][:, :, there]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import hypot, sqrt
 
 import numpy as np
 
 from gliderwatch.estimation import adaptive
 from gliderwatch.estimation.adaptive import Learner
-from gliderwatch.estimation.dive_measurement import PROVISIONAL, REPORTED
+from gliderwatch.estimation.constants import APART, PROVISIONAL, REPORTED
 from gliderwatch.estimation.healthy_baseline import Baseline, learn, told
 from gliderwatch.estimation.kalman import JointEstimate, JointInfo, JointParams, expected_flow
 from gliderwatch.estimation.speed_range import RangeParams
@@ -26,9 +27,6 @@ from gliderwatch.sea.ocean_field import Field
 
 # ----------------------------------------
 # What the joint estimator says of a dive, as an assessment.
-
-APART = 16.0
-"""Squared misfit of flow and reference, in standard errors, that is no chance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +45,7 @@ class Estimate:
     currents: Currents = Currents()
 
 
+@lru_cache(maxsize=64)
 def speed_params(params: GliderParams) -> SpeedParams:
     """The parameters of the joint estimator and of its tests among those of a glider."""
     return SpeedParams(

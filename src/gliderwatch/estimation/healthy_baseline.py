@@ -16,22 +16,28 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from gliderwatch.estimation.kinematic_speed import MAD_TO_SIGMA
-from gliderwatch.estimation.speed_range import LIKE
+from gliderwatch.estimation.constants import (
+    ASYMMETRY_RANGE,
+    BALLAST_RANGE,
+    BASELINE_FIRST,
+    BASELINE_LEAST,
+    BASELINE_MOST,
+    BASELINE_RECENT,
+    BRIEF,
+    DEPTH_RANGE,
+    DURATION_LEAST,
+    DURATION_RANGE,
+    LIKE,
+    MAD_TO_SIGMA,
+    RANGE_WIDTH,
+    RATE_RANGE,
+    ROLL_RANGE,
+    SHORTEST,
+    VACUUM_RANGE,
+    YOS_RANGE,
+)
 from gliderwatch.model import Array, DiveFeatures, readonly
 from gliderwatch.navigation.features import evidence
-
-FIRST, RECENT = 12, 12
-"""Healthy dives kept of those at a like setting of the thruster: the first and the latest."""
-MOST = 144
-"""Dives kept of all settings: six settings' worth."""
-LEAST = 5
-"""Dives that tell what is usual."""
-SHORTEST, BRIEF = 3600.0, 1800.0
-"""s: a shorter dive teaches nothing, because after launch pilots try out the ballast; and one so short that
-its numbers are those of its turns is not compared."""
-WIDTH = 4.0
-"""Half width of a range in robust standard deviations."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,21 +53,21 @@ class Quantity:
 
 TRIM = ("pitch_dive", "pitch_climb", "ballast_dive", "ballast_climb")
 QUANTITIES = (
-    Quantity("roll_mean", least=0.08),
-    Quantity("pitch_dive", least=0.08),
-    Quantity("pitch_climb", least=0.08),
-    Quantity("pitch_asymmetry", least=0.1),
-    Quantity("depth_rate_dive", part=0.15, given=TRIM),
-    Quantity("depth_rate_climb", part=0.15, given=TRIM),
-    Quantity("rate_ratio", part=0.15, given=TRIM),
-    Quantity("ballast_dive", least=20e-6, part=0.15),
-    Quantity("ballast_climb", least=20e-6, part=0.15),
-    Quantity("yos_per_hour", part=0.3, given=(*TRIM, "depth_max")),
-    Quantity("duration_h", least=0.5, part=0.4),
-    Quantity("vacuum", least=4e3),
+    Quantity("roll_mean", least=ROLL_RANGE),
+    Quantity("pitch_dive", least=ROLL_RANGE),
+    Quantity("pitch_climb", least=ROLL_RANGE),
+    Quantity("pitch_asymmetry", least=ASYMMETRY_RANGE),
+    Quantity("depth_rate_dive", part=RATE_RANGE, given=TRIM),
+    Quantity("depth_rate_climb", part=RATE_RANGE, given=TRIM),
+    Quantity("rate_ratio", part=RATE_RANGE, given=TRIM),
+    Quantity("ballast_dive", least=BALLAST_RANGE, part=RATE_RANGE),
+    Quantity("ballast_climb", least=BALLAST_RANGE, part=RATE_RANGE),
+    Quantity("yos_per_hour", part=YOS_RANGE, given=(*TRIM, "depth_max")),
+    Quantity("duration_h", least=DURATION_LEAST, part=DURATION_RANGE),
+    Quantity("vacuum", least=VACUUM_RANGE),
 )
 """Names and units: `docs/nomenclature.md`."""
-_DEPTH = Quantity("depth_max", least=5.0, part=0.15)
+_DEPTH = Quantity("depth_max", least=DEPTH_RANGE, part=RATE_RANGE)
 _BY_NAME = {q.name: q for q in (*QUANTITIES, _DEPTH)}
 _COLUMN = {name: i for i, name in enumerate((*_BY_NAME, "thruster"))}
 
@@ -70,8 +76,8 @@ _COLUMN = {name: i for i, name in enumerate((*_BY_NAME, "thruster"))}
 class Baseline:
     """Healthy dives of one deployment, oldest first.
 
-    ``dives`` ((k, n), k at most `MOST`) has a column for each of `QUANTITIES`, for the depth reached and for
-    the thruster; ``known`` (the same shape) is 1 where a dive tells, else 0.
+    ``dives`` ((k, n), k at most `BASELINE_MOST`) has a column for each of `QUANTITIES`, for the depth reached
+    and for the thruster; ``known`` (the same shape) is 1 where a dive tells, else 0.
     """
 
     dives: Array = field(default_factory=lambda: readonly(np.empty((0, len(_COLUMN)))))
@@ -98,9 +104,9 @@ def learn(baseline: Baseline, features: DiveFeatures) -> Baseline:
     row = _row(features)
     dives = np.concatenate([_dives(baseline), row[None]])
     alike = np.flatnonzero(_same_setting(dives, row))
-    if len(alike) > FIRST + RECENT:
-        dives = np.delete(dives, alike[FIRST], axis=0)
-    dives = dives[-MOST:]
+    if len(alike) > BASELINE_FIRST + BASELINE_RECENT:
+        dives = np.delete(dives, alike[BASELINE_FIRST], axis=0)
+    dives = dives[-BASELINE_MOST:]
     known = np.isfinite(dives)
     return Baseline(readonly(np.where(known, dives, 0.0)), readonly(known))
 
@@ -182,14 +188,16 @@ def _usual(values: list[float], same: list[bool], quantity: Quantity) -> tuple[f
     ``values`` of each dive, NaN where it does not tell; ``same``: whether it was at the same trim.
     """
     known = [value for value in values if isfinite(value)]
-    windows = [known[:FIRST], known[-RECENT:]]
+    windows = [known[:BASELINE_FIRST], known[-BASELINE_RECENT:]]
     if quantity.given:
         alike = [each for value, each in zip(values, same, strict=True) if isfinite(value)]
-        first = list(compress(known[:FIRST], alike))
+        first = list(compress(known[:BASELINE_FIRST], alike))
         # the first dives alone, so that what grows slowly is not usual in the end
-        windows = [first if len(first) >= LEAST else list(compress(known, alike))]
-    if len(windows[-1]) < LEAST:
+        windows = [first if len(first) >= BASELINE_LEAST else list(compress(known, alike))]
+    if len(windows[-1]) < BASELINE_LEAST:
         return None
+    if len(known) <= min(BASELINE_FIRST, BASELINE_RECENT):
+        del windows[1:]  # the first are the latest too
     ranges = [_range(values, quantity) for values in windows]
     return min(low for low, _, _ in ranges), ranges[-1][1], max(high for _, _, high in ranges)
 
@@ -206,6 +214,6 @@ def _same_trim(dives: Array, row: Array, given: tuple[str, ...]) -> list[bool]:
 
 def _range(values: list[float], quantity: Quantity) -> tuple[float, float, float]:
     usual = median(values)  # of a dozen values: numpy's is for thousands
-    spread = WIDTH * MAD_TO_SIGMA * median([abs(value - usual) for value in values])
+    spread = RANGE_WIDTH * MAD_TO_SIGMA * median([abs(value - usual) for value in values])
     half = max(spread, quantity.least, quantity.part * abs(usual))
     return usual - half, usual, usual + half

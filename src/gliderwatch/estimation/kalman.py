@@ -9,8 +9,30 @@ from functools import cache
 import numpy as np
 
 from gliderwatch.estimation import step_test
-from gliderwatch.estimation.dive_measurement import (
+from gliderwatch.estimation.constants import (
+    FAR,
     FASTEST,
+    FIRST_SPEED,
+    FIRST_SPEED_ERROR,
+    FRONT,
+    LEAST_SLIP,
+    LEAST_TESTED,
+    MEASUREMENT_SCALES,
+    MOST_SIDE,
+    MOST_SLIP,
+    NOISE_FEW,
+    NOISE_MEMORY,
+    OWN_NOISE,
+    PROCESS_SCALES,
+    RARE,
+    REAL_SLIP,
+    SIDE_ERROR,
+    SLIP_ERROR,
+    SLIP_MEMORY,
+    SPEED_WANDER,
+    WING_SIDE,
+)
+from gliderwatch.estimation.dive_measurement import (
     OWN,
     SHOWN,
     SIDE,
@@ -22,7 +44,16 @@ from gliderwatch.estimation.dive_measurement import (
     slip_of,
 )
 from gliderwatch.estimation.kinematic_speed import KinematicSpeed
-from gliderwatch.estimation.modes import MODES, ROLLED, Cause, Explained, Mode, explain, switched
+from gliderwatch.estimation.modes import (
+    MODES,
+    ROLLED,
+    Cause,
+    Explained,
+    Explanations,
+    Mode,
+    explain,
+    switched,
+)
 from gliderwatch.estimation.step_test import Bank, Step, Update
 from gliderwatch.model import Array, Dive, Fix, readonly
 from gliderwatch.sea import gauss_markov
@@ -30,18 +61,6 @@ from gliderwatch.sea.gauss_markov import FlowParams, Passage
 
 # ----------------------------------------
 # How restless the sea and how good the data are, learnt from what the innovations are.
-
-MEMORY, FEW = 40, 6
-"""Dives over which noise is learnt, and how many the first guess of it counts for."""
-FAR = 4.0
-"""A normalised square above this counts as this much, so that a fault does not pass for noise."""
-SEA, DOUBT = (0.1, 40.0), (0.02, 9.0)
-"""Bounds of the factors on the variance of the flow's changes and of the measurements. The noise of a current
-is 0.6 cm/s before anything is learnt; on the real missions at hand it is about that, and a tenth of it where
-compass, pitch and fixes are as good as simulated ones."""
-LEAST_DOUBT = 0.25
-"""What the tests take the factor on the measurements for, at least: data that were better than usual until
-now do not make a fault of the first dive that is as usual."""
 
 
 def learn_process_scale(factor: float, square: float | None, share: float, dives: int) -> float:
@@ -54,16 +73,16 @@ def learn_process_scale(factor: float, square: float | None, share: float, dives
     >>> round(learn_process_scale(1.0, 2.0, 0.5, dives=4), 3)
     1.2
     """
-    return _within(factor * (1 + 2 * min(2 * share, 1.0) * _part(dives) * _excess(square)), SEA)
+    return _within(factor * (1 + 2 * min(2 * share, 1.0) * _part(dives) * _excess(square)), PROCESS_SCALES)
 
 
 def learn_measurement_scale(factor: float, square: float | None, dives: int) -> float:
     """The factor on the variance of the measurements, likewise."""
-    return _within(factor * (1 + _part(dives) * _excess(square)), DOUBT)
+    return _within(factor * (1 + _part(dives) * _excess(square)), MEASUREMENT_SCALES)
 
 
 def _part(dives: int) -> float:
-    return 1 / min(dives + FEW, MEMORY)
+    return 1 / min(dives + NOISE_FEW, NOISE_MEMORY)
 
 
 def _excess(square: float | None) -> float:
@@ -84,13 +103,6 @@ def _within(value: float, bounds: tuple[float, float]) -> float:
 # when it speaks, slip and side are opened by as much as the step is uncertain, within what a wing or a
 # compass can do.
 
-LEAST_SLIP, MOST_SLIP, MOST_SIDE = -0.1, 0.95, 0.85
-"""What slip of the state can be: on board at most a tenth of W too much is allowed for the angle of attack,
-and a glider does not fly backwards. A compass, or a bent wing, that turns the way by more than a radian (its
-sine) is not thought of."""
-RARE = 0.01
-"""Weight of a mode below which it is left out of the mixture."""
-
 
 @dataclass(frozen=True, slots=True)
 class JointParams:
@@ -105,15 +117,15 @@ class JointParams:
 
     flow: FlowParams = FlowParams()
     modes: tuple[Mode, ...] = MODES
-    speed: float = 0.35
-    speed_sigma: float = 0.2
-    speed_wander: float = 0.015
-    slip: float = 0.75
-    slip_sigma: float = 0.018
-    side_sigma: float = 0.03
-    slip_memory: float = 30 * 86400.0
-    own_noise: float = 0.01
-    front: float = 0.25
+    speed: float = FIRST_SPEED
+    speed_sigma: float = FIRST_SPEED_ERROR
+    speed_wander: float = SPEED_WANDER
+    slip: float = REAL_SLIP
+    slip_sigma: float = SLIP_ERROR
+    side_sigma: float = SIDE_ERROR
+    slip_memory: float = SLIP_MEMORY
+    own_noise: float = OWN_NOISE
+    front: float = FRONT
     alarms_per_month: float = 0.05
 
 
@@ -140,7 +152,7 @@ class JointState:
     @property
     def tested(self) -> float:
         """The factor on the variance of the measurements with which dives are tested."""
-        return max(self.measurement_scale, LEAST_DOUBT)
+        return max(self.measurement_scale, LEAST_TESTED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,51 +230,48 @@ def step(
     passage = _passage(state, seen, dive.start.lat, params)
     state = _predicted(state, seen, passage, params)
     slipping = Slipping(params.slip * seen.slip, math.sqrt(state.tested) * params.own_noise, usual)
-    measured = Measured(seen, tells, state.tested, slipping)
-    steps = _jump(params.flow)
-    shown, jumped = state.cov[-SHOWN:, -SHOWN:], steps[-SHOWN:] @ steps[-SHOWN:].T
-    modes = switched(params.modes, state.wrong)
-    ways = explain(state.x[-SHOWN:], shown, jumped, measured, (*modes, *((ROLLED,) if hint else ())))
-    odds = {
-        str(cause): sum(w.weight for w in ways if w.cause is cause)
-        for cause in dict.fromkeys(w.cause for w in ways)
-    }
-    cause = max(odds, key=lambda each: odds[each])
-    best = max((w for w in ways if str(w.cause) == cause), key=lambda way: way.weight)
+    found = _explained(state, Measured(seen, tells, state.tested, slipping), params, hint)
     believed = seen.own_speed()
     across = _across(state, seen, believed)
-    process_scale, measurement_scale = _learnt(state, passage, best, ways, across)
-    after = _mixed(state, ways, steps)
-    usually = [w for w in ways if w.cause is Cause.USUAL and w.believes == best.believes]
-    tested = _update(state, usually[0] if usually and best.cause is Cause.FLOW else best, steps)
-    loss, turn, bank = step_test.steps(state.bank, passage_matrix(passage), tested, steps, params.front)
+    loss, turn, bank = _tested(state, found, passage, params)
     # where no heading was measured, what looks like a step is a turn that was not seen
     told = None if seen.is_free else step_test.told(loss, turn, params.alarms_per_month)
-    after = replace(
-        after,
-        process_scale=process_scale,
-        measurement_scale=measurement_scale,
-        bank=bank,
-        end=dive.end,
-        dives=state.dives + 1,
-        wrong={each: odds[str(each)] for each in Cause if each.is_error and str(each) in odds},
-    )
-    after = _opened(after, told)
-    info = JointInfo(
+    after = _learnt(state, _mixed(state, found.ways, _jump(params.flow)), found, passage, across)
+    after = _opened(replace(after, bank=bank, end=dive.end), told)
+    return after, JointInfo(
         seen=seen,
         estimate=_estimate(after, seen, params, slipping),
         single_sigma=believed[1] * math.sqrt(state.tested) if believed else math.inf,
         across=across,
-        cause=best.cause,
-        odds=odds,
-        believes=best.believes,
-        nis=best.square,
-        dof=len(best.innovation),
+        cause=found.best.cause,
+        odds=found.odds,
+        believes=found.best.believes,
+        nis=found.best.square,
+        dof=len(found.best.innovation),
         loss=loss,
         turn=turn,
         told=told,
     )
-    return after, info
+
+
+def _explained(state: JointState, measured: Measured, params: JointParams, hint: bool) -> Explanations:
+    """A dive in all modes; ``hint``: also in that of a wing that was lost or bent."""
+    steps, shown = _jump(params.flow)[-SHOWN:], state.cov[-SHOWN:, -SHOWN:]
+    modes = (*switched(params.modes, state.wrong), *((ROLLED,) if hint else ()))
+    return Explanations.of(explain(state.x[-SHOWN:], shown, steps @ steps.T, measured, modes))
+
+
+def _tested(
+    state: JointState, found: Explanations, passage: Passage, params: JointParams
+) -> tuple[Step | None, Step | None, Bank]:
+    """The likeliest loss and turn, and the bank with one more dive.
+
+    Another flow may be what a step looks like, so that such a dive is tested as a usual one.
+    """
+    way = found.usual if found.usual is not None and found.best.cause is Cause.FLOW else found.best
+    steps = _jump(params.flow)
+    update = _update(state, way, steps)
+    return step_test.steps(state.bank, passage_matrix(passage), update, steps, params.front)
 
 
 def _passage(state: JointState, seen: Observation, lat: float, params: JointParams) -> Passage:
@@ -307,8 +316,13 @@ def _predicted(state: JointState, seen: Observation, passage: Passage, params: J
 
 def _update(state: JointState, way: Explained, steps: Array) -> Update:
     """The update of the whole state that one explanation of a dive makes."""
-    turned = _cov(state, way, steps)[:, -SHOWN:] @ way.rows.T
-    rows = np.zeros((len(way.rows), len(state.x)))
+    return _update_of(_cov(state, way, steps), way)
+
+
+def _update_of(cov: Array, way: Explained) -> Update:
+    """The same, of a state with the covariance ``cov`` ((n, n)), with what the explanation opens."""
+    turned = cov[:, -SHOWN:] @ way.rows.T
+    rows = np.zeros((len(way.rows), len(cov)))
     rows[:, -SHOWN:] = way.rows
     return Update(rows, turned @ way.weight_matrix, way.weight_matrix, way.innovation)
 
@@ -323,7 +337,7 @@ def _cov(state: JointState, way: Explained, steps: Array) -> Array:
         return cov
     if way.cause is Cause.WING:
         cov = state.cov.copy()
-        cov[[SLIP, SIDE], [SLIP, SIDE]] += np.square([way.size, way.size / 3])
+        cov[[SLIP, SIDE], [SLIP, SIDE]] += np.square([way.size, WING_SIDE])
         return cov
     return state.cov
 
@@ -334,7 +348,8 @@ def _mixed(state: JointState, ways: list[Explained], steps: Array) -> JointState
     total = sum(way.weight for way in kept)
     means, covs = [], []
     for way in kept:
-        update, cov = _update(state, way, steps), _cov(state, way, steps)
+        cov = _cov(state, way, steps)
+        update = _update_of(cov, way)
         means.append(state.x + update.gain @ way.innovation)
         covs.append(cov - update.gain @ (update.rows @ cov))
     weights = np.array([way.weight / total for way in kept])
@@ -355,29 +370,35 @@ def _bounded(x: Array) -> Array:
 
 def _learnt(
     state: JointState,
+    mixed: JointState,
+    found: Explanations,
     passage: Passage,
-    best: Explained,
-    ways: list[Explained],
     across: tuple[float, float] | None,
-) -> tuple[float, float]:
-    """The factors on the flow's changes and on the noise of measurements after one more dive."""
-    usual = next((w for w in ways if w.cause is Cause.USUAL and w.believes == best.believes), None)
-    square, share = None, 0.0
-    if usual is not None and best.cause in (Cause.USUAL, Cause.FLOW) and state.dives:
-        at = (
-            slice(2, 4) if len(usual.innovation) > 3 else slice(0, 2)
-        )  # the current, else the ground velocity
-        rows, e = usual.rows[at], usual.innovation[at]
-        s = rows @ state.cov[-SHOWN:, -SHOWN:] @ rows.T + usual.noise[at, at]
-        inverse = np.linalg.inv(s)
-        square = float(e @ inverse @ e) / 2
-        share = float(np.trace(inverse)) / 2 * passage.restless
+) -> JointState:
+    """The state ``mixed`` with what a dive adds to the noise learnt in ``state`` and to what was wrong."""
+    square, share = _surprise(state, found, passage)
     aside = None
-    if not best.cause.is_error and across is not None:
+    if not found.best.cause.is_error and across is not None:
         aside = (across[0] / across[1]) ** 2 * state.tested / state.measurement_scale
-    return learn_process_scale(state.process_scale, square, share, state.dives), learn_measurement_scale(
-        state.measurement_scale, aside, state.dives
+    return replace(
+        mixed,
+        process_scale=learn_process_scale(state.process_scale, square, share, state.dives),
+        measurement_scale=learn_measurement_scale(state.measurement_scale, aside, state.dives),
+        dives=state.dives + 1,
+        wrong={each: found.odds[str(each)] for each in Cause if each.is_error and str(each) in found.odds},
     )
+
+
+def _surprise(state: JointState, found: Explanations, passage: Passage) -> tuple[float | None, float]:
+    """The normalised square of what the flow does on a dive, and the share of its variance that is no tide;
+    (None, 0.0) where it does not tell."""
+    usual = found.usual
+    if usual is None or found.best.cause not in (Cause.USUAL, Cause.FLOW) or not state.dives:
+        return None, 0.0
+    at = slice(2, 4) if len(usual.innovation) > 3 else slice(0, 2)  # the current, else the ground velocity
+    rows, e = usual.rows[at], usual.innovation[at]
+    inverse = np.linalg.inv(rows @ state.cov[-SHOWN:, -SHOWN:] @ rows.T + usual.noise[at, at])
+    return float(e @ inverse @ e) / 2, float(np.trace(inverse)) / 2 * passage.restless
 
 
 def _across(

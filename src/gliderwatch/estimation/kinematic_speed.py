@@ -12,16 +12,20 @@ from dataclasses import dataclass
 from math import tan
 from statistics import median
 
+from gliderwatch.estimation.constants import (
+    FLATTEST_PITCH,
+    MAD_TO_SIGMA,
+    ONBOARD_LEAST,
+    ONBOARD_LIES,
+    RATIOS_FEW,
+    RATIOS_KEPT,
+    SHORTEST,
+    VERTICAL_LEAST,
+    VERTICAL_LIES,
+    VERTICAL_RATIO,
+    VERTICAL_SPREAD,
+)
 from gliderwatch.model import DiveFeatures
-
-KEPT, FEW = 12, 3
-"""Healthy dives from which a ratio is learnt, at most and at least."""
-SHORTEST = 3600.0
-"""s: on a shorter dive the turns and the surface take too much of the time."""
-FLATTEST = 0.15
-"""rad: below this pitch its tangent says too little."""
-MAD_TO_SIGMA = 1.4826
-"""Standard deviation of normal numbers by their median absolute deviation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +38,8 @@ class Source:
     lies: float
 
 
-VERTICAL, ONBOARD = Source((1 / 1.17, 0.15), 0.07, 0.01), Source(None, 0.12, 0.1)
+VERTICAL = Source((VERTICAL_RATIO, VERTICAL_SPREAD), VERTICAL_LEAST, VERTICAL_LIES)
+ONBOARD = Source(None, ONBOARD_LEAST, ONBOARD_LIES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +72,7 @@ def vertical(features: DiveFeatures) -> float | None:
         (features.depth_rate_dive, features.pitch_dive),
         (features.depth_rate_climb, features.pitch_climb),
     ):
-        if rate is None or pitch is None or abs(pitch) < FLATTEST or rate == 0:
+        if rate is None or pitch is None or abs(pitch) < FLATTEST_PITCH or rate == 0:
             return None
         slowness.append(tan(abs(pitch)) / abs(rate))
     return 2 / sum(slowness)
@@ -99,12 +104,12 @@ def kinematic_speed(ratios: Ratios, features: DiveFeatures) -> KinematicSpeed | 
 
 
 def _with(ratios: tuple[float, ...], value: float | None, own: float) -> tuple[float, ...]:
-    return ratios if value is None or not value > 0 else (*ratios, own / value)[-KEPT:]
+    return ratios if value is None or not value > 0 else (*ratios, own / value)[-RATIOS_KEPT:]
 
 
 def _ratio(source: Source, known: tuple[float, ...]) -> tuple[float, float] | None:
     """The ratio of W to a speed, and its standard error as a part of it."""
-    if len(known) < FEW:
+    if len(known) < RATIOS_FEW:
         return source.first
     ratio = median(known)
     spread = MAD_TO_SIGMA * median(abs(each / ratio - 1) for each in known)

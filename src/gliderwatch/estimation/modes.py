@@ -12,22 +12,34 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import lru_cache
 from math import log, pi, sqrt
 
 import numpy as np
 
-from gliderwatch.estimation.dive_measurement import FASTEST, OWN, SIDE, SLIP, Measured, expected
+from gliderwatch.estimation.constants import (
+    BEYOND,
+    CURRENT_CHANCE,
+    CURRENT_ERROR,
+    FASTEST,
+    FLOW_CHANCE,
+    FRONT,
+    GROUND_CHANCE,
+    GROUND_ERROR,
+    ITERATIONS,
+    LEAST_SLIP,
+    LEFT_OUT,
+    MOST_SIDE,
+    MOST_SLIP,
+    SPEED_CHANCE,
+    SPEED_STEP,
+    STAYS,
+    WING_ODDS,
+    WING_SIDE,
+    WING_SLIP,
+)
+from gliderwatch.estimation.dive_measurement import OWN, SIDE, SLIP, Measured, expected
 from gliderwatch.model import Array
-
-ITERATIONS = 2
-BEYOND = 0.02
-"""m/s by which a speed may be found beyond what a glider can fly, before that speaks against an
-explanation."""
-STAYS = 0.6
-"""Chance that a current, or a ground velocity, which is wrong on one dive is wrong on the next one too: a
-fault lasts."""
-LEFT_OUT = 10.0
-"""m/s: error given to a measurement that is wrong: it is left out, be it as near as it may."""
 
 
 class Cause(StrEnum):
@@ -58,14 +70,19 @@ class Mode:
 
 
 MODES = (
-    Mode(Cause.USUAL, 0.92, 0.0),
-    Mode(Cause.SPEED, 0.02, 0.2),
-    Mode(Cause.FLOW, 0.03, 0.25),
-    Mode(Cause.CURRENT, 0.02, 0.4, "the current does not fit those before, the ground velocity does"),
+    Mode(Cause.USUAL, 1 - (SPEED_CHANCE + FLOW_CHANCE + CURRENT_CHANCE + GROUND_CHANCE), 0.0),
+    Mode(Cause.SPEED, SPEED_CHANCE, SPEED_STEP),
+    Mode(Cause.FLOW, FLOW_CHANCE, FRONT),
+    Mode(
+        Cause.CURRENT,
+        CURRENT_CHANCE,
+        CURRENT_ERROR,
+        "the current does not fit those before, the ground velocity does",
+    ),
     Mode(
         Cause.GROUND,
-        0.01,
-        0.3,
+        GROUND_CHANCE,
+        GROUND_ERROR,
         "the ground velocity does not fit, the current does: fixes or headings are wrong",
     ),
 )
@@ -74,11 +91,18 @@ MODES = (
 def switched(modes: tuple[Mode, ...], before: Mapping[Cause, float]) -> tuple[Mode, ...]:
     """The modes with the chances that they have after a dive which was explained so ``before``: what is
     wrong stays."""
-    rare = {
-        mode.cause: max(mode.chance, STAYS * before.get(mode.cause, 0.0))
+    rare = (
+        (mode.cause, max(mode.chance, STAYS * before.get(mode.cause, 0.0)))
         for mode in modes
         if mode.cause.is_error
-    }
+    )
+    return _with_chances(modes, tuple(rare))
+
+
+@lru_cache(maxsize=64)  # on nearly all dives nothing was wrong before
+def _with_chances(modes: tuple[Mode, ...], chances: tuple[tuple[Cause, float], ...]) -> tuple[Mode, ...]:
+    """The modes where these have other chances, and the rest what is left, in proportion."""
+    rare = dict(chances)
     left = 1 - sum(rare.values())
     rest = sum(mode.chance for mode in modes if not mode.cause.is_error)
     return tuple(
@@ -87,9 +111,9 @@ def switched(modes: tuple[Mode, ...], before: Mapping[Cause, float]) -> tuple[Mo
     )
 
 
-ROLLED = Mode(Cause.WING, 9.0, 0.45)
-"""Beside these where the glider has just begun to roll otherwise, which little else does: nine to one.
-``size`` is of slip, a third of that of side."""
+ROLLED = Mode(Cause.WING, WING_ODDS, WING_SLIP)
+"""Beside these where the glider has just begun to roll otherwise, which little else does.
+``size`` is of slip."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +138,31 @@ class Explained:
     def square(self) -> float:
         """The normalised innovation squared."""
         return float(self.innovation @ self.weight_matrix @ self.innovation)
+
+
+@dataclass(frozen=True, slots=True)
+class Explanations:
+    """A dive in all modes.
+
+    ``ways`` with weights that add up to 1; ``odds`` of each cause; ``best`` the weightiest way of the
+    likeliest cause, ``usual`` the usual one that believes what the best does (None: there is none).
+    """
+
+    ways: list[Explained]
+    odds: dict[str, float]
+    best: Explained
+    usual: Explained | None
+
+    @classmethod
+    def of(cls, ways: list[Explained]) -> Explanations:
+        """All that ways say together."""
+        odds: dict[str, float] = {}
+        for way in ways:
+            odds[str(way.cause)] = odds.get(str(way.cause), 0) + way.weight
+        cause = max(odds, key=lambda each: odds[each])
+        best = max((way for way in ways if str(way.cause) == cause), key=lambda way: way.weight)
+        usual = (way for way in ways if way.cause is Cause.USUAL and way.believes == best.believes)
+        return cls(ways, odds, best, next(usual, None))
 
 
 def explain(
@@ -141,7 +190,7 @@ def explain(
         state = x + (turned @ (inverse @ innovation[:, :, None]))[:, :, 0]
         free = state[:, OWN].copy()
         state[:, OWN] = np.clip(free, 0.0, FASTEST)
-        state[:, SLIP:] = np.clip(state[:, SLIP:], [-0.1, -0.85], [0.95, 0.85])
+        state[:, SLIP:] = np.clip(state[:, SLIP:], [LEAST_SLIP, -MOST_SIDE], [MOST_SLIP, MOST_SIDE])
     beyond = np.maximum(np.maximum(-free, free - FASTEST), 0.0)
     logs = logs - 0.5 * (beyond / BEYOND) ** 2
     squares = np.einsum("ki,kij,kj->k", innovation, inverse, innovation)
@@ -174,7 +223,7 @@ def _opened(
         elif mode.cause is Cause.FLOW:
             opened[k] += mode.size**2 * jumped
         elif mode.cause is Cause.WING:
-            opened[k][[SLIP, SIDE], [SLIP, SIDE]] += np.square([mode.size, mode.size / 3])
+            opened[k][[SLIP, SIDE], [SLIP, SIDE]] += np.square([mode.size, WING_SIDE])
         elif mode.cause.is_error:
             at = slice(2, 4) if mode.cause is Cause.CURRENT else slice(0, 2)
             wrong[k, at, at] = mode.size**2 * np.eye(2)

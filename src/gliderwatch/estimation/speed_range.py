@@ -13,12 +13,21 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from gliderwatch.estimation.dive_measurement import FASTEST
-from gliderwatch.estimation.kinematic_speed import MAD_TO_SIGMA
+from gliderwatch.estimation.constants import (
+    ABOVE,
+    FASTEST,
+    LIKE,
+    MAD_TO_SIGMA,
+    NARROWEST,
+    RANGE_LEAST,
+    RANGE_MOST,
+    RANGE_WIDTH,
+    SHORTEST,
+    TRIALS,
+    USUAL_DIVE,
+    WIDEST,
+)
 from gliderwatch.model import Array, DiveFeatures, readonly
-
-LIKE = 0.1
-"""Settings of a thruster (0 to 1) that differ by less are alike."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,15 +42,15 @@ class RangeParams:
     reach over three days: water that is a little denser or lighter stays for a day.
     """
 
-    least: int = 3
-    most: int = 24
-    width: float = 4.0
-    narrowest: float = 0.15
-    widest: float = 0.25
-    above: float = 0.35
-    shortest: float = 3600.0
-    trials: int = 8
-    spacing: float = 3 * 3600.0
+    least: int = RANGE_LEAST
+    most: int = RANGE_MOST
+    width: float = RANGE_WIDTH
+    narrowest: float = NARROWEST
+    widest: float = WIDEST
+    above: float = ABOVE
+    shortest: float = SHORTEST
+    trials: int = TRIALS
+    spacing: float = USUAL_DIVE
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,14 @@ from functools import cache
 
 import numpy as np
 
+from gliderwatch.estimation.constants import (
+    CALIBRATED_ALARMS,
+    CALIBRATED_FALL,
+    CALIBRATED_RATIO,
+    LONGEST_INNOVATION,
+    STEP_SIZE,
+    WINDOW,
+)
 from gliderwatch.estimation.dive_measurement import SIDE, SLIP
 from gliderwatch.model import Array, readonly
 
@@ -18,16 +26,6 @@ from gliderwatch.model import Array, readonly
 # of every recent dive whether a step in the state of a Kalman filter, begun just before that dive, explains
 # the innovations since. `cusum` is Page's (1954): it adds up small departures of one number in one
 # direction. Both are set by how often they may cry wolf.
-
-WINDOW = 24
-"""Dives that a step may lie back, some three days: by then the flow has forgotten what it was before."""
-CALIBRATED = (0.5, 10.0, 4.0)
-"""Alarms a healthy glider gives in a month at a ratio, that ratio, and by how much it must rise for a factor
-e fewer. Fitted to what `python benchmarks/joint.py calibrate` printed (74 glider-months, seven kinds of sea):
-
-    ratio above     8     10    12    14    16    18    20    24
-    alarms a month  .89   .43   .30   .20   .11   .068  .027  .014
-"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,8 +146,8 @@ def ratio_bound(alarms_per_month: float) -> float:
     """
     if not alarms_per_month > 0:
         raise ValueError(f"alarms a month must be above 0, not {alarms_per_month}")
-    most, ratio, fall = CALIBRATED
-    return ratio + fall * math.log(most / min(alarms_per_month, most))
+    alarms = min(alarms_per_month, CALIBRATED_ALARMS)
+    return CALIBRATED_RATIO + CALIBRATED_FALL * math.log(CALIBRATED_ALARMS / alarms)
 
 
 def cusum(before: float, departure: float, slack: float) -> float:
@@ -186,11 +184,6 @@ def cusum_bound(slack: float, dives_between_alarms: float) -> float:
 # ----------------------------------------
 # Losses that the glider does not know of: steps in slip (a lost or bent wing) and side (a compass).
 
-LARGEST = 0.5
-"""Usual size of a step in slip or side (parts of W)."""
-MOST = 4.0
-"""Standard errors: an innovation that is longer counts as this long."""
-
 
 def steps(
     bank: Bank, matrix: Array, update: Update, jump: Array, front: float
@@ -204,9 +197,9 @@ def steps(
     shape = np.zeros((len(matrix), 4))
     shape[[SLIP, SIDE], [0, 1]] = 1.0
     shape[:, 2:] = jump
-    sizes = np.array([LARGEST, LARGEST, front, front])
+    sizes = np.array([STEP_SIZE, STEP_SIZE, front, front])
     square = float(update.innovation @ update.weight @ update.innovation)
-    believed = update.innovation * min(1.0, MOST / math.sqrt(max(square, 1e-12)))
+    believed = update.innovation * min(1.0, LONGEST_INNOVATION / math.sqrt(max(square, 1e-12)))
     bank = advance(bank, shape, np.diag(sizes**-2), matrix, replace(update, innovation=believed))
     return likeliest(bank, 0, sign=1), likeliest(bank, 1), bank
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gliderwatch.estimation.constants import MODEL_ERROR, SHALLOW
 from gliderwatch.model import Array, Assessment, Current, Dive, Fix
 from gliderwatch.navigation.features import evidence
 from gliderwatch.navigation.track import closure
@@ -58,11 +59,6 @@ def unassessed(dive: Dive, params: GliderParams, digest: str, reason: str) -> As
 
 # ----------------------------------------
 # The reference flow F_M of a dive, where it is another than the dive's own current.
-
-MODEL_ERROR = 0.1
-"""m/s, a component: usual error of an ocean model or a radar beside a glider's mean current."""
-SHALLOW = 30.0
-"""Metres to which a model is averaged where the depth of the dive is not known."""
 
 
 @dataclass(frozen=True, slots=True)

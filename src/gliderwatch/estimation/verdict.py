@@ -11,7 +11,30 @@ from statistics import median
 import numpy as np
 
 from gliderwatch.estimation import kalman
-from gliderwatch.estimation.dive_measurement import USUAL_PITCH, slip_at
+from gliderwatch.estimation.constants import (
+    AGREE,
+    BASELINE_LEAST,
+    CLEARLY,
+    COMPASS_OFF,
+    CONFIDENCE,
+    DEPARTURE,
+    ENOUGH,
+    EXPLAINED,
+    GATE,
+    HIDDEN,
+    LEAST_ACROSS,
+    MISFITS_KEPT,
+    OWN_SURE,
+    RETRIMMED,
+    ROLL_CONFIRMS,
+    ROLL_STEP,
+    SLACK,
+    TURNED,
+    USUAL_DIVE,
+    USUAL_PITCH,
+    VAGUE,
+)
+from gliderwatch.estimation.dive_measurement import slip_at
 from gliderwatch.estimation.kalman import JointInfo, JointParams, JointState
 from gliderwatch.estimation.kinematic_speed import KinematicSpeed, Ratios, kinematic_speed
 from gliderwatch.estimation.kinematic_speed import learn as learn_ratios
@@ -35,13 +58,6 @@ from gliderwatch.model import Array, Dive, Flag
 # heading, at any speed. What is left across the heading has no other cause than a measurement that is
 # wrong: the current, the fixes, or the headings (compass, declination). A current that is wrong on many dives
 # alike stays where it is when the glider turns; a heading that is wrong turns with it.
-
-KEPT = 8
-"""Dives back over which a current is told from a compass."""
-CLEARLY = 6.0
-"""By how much the chi-square of one explanation has to be below that of the other."""
-TURNED = math.radians(45)
-"""By how much the glider must have turned before the two can differ."""
 
 
 class Blame(StrEnum):
@@ -132,34 +148,15 @@ def _left(shape: Array, across: Array, sigma: Array) -> float:
 # Flag 2: a measurement is wrong. Flag 1: the glider is slower than normal (or faster than configured), at
 # once or by evidence over several dives. No flag: its speed cannot be known from this dive, and why.
 
-DIVES_A_MONTH, USUAL_DIVE = 240.0, 3 * 3600.0
-"""Dives of 3 h in 30 days, and that time in s: of shorter dives each counts for less."""
-DEPARTURE, SLACK = 0.08, 1.0
-"""Part of the usual speed by which a healthy glider's speed varies at least, for the sum of small losses;
-and how many times that does not add to the sum."""
-OWN_SURE = 0.15
-"""Standard error of W on a dive, as part of it, up to which the dive tells what W is to what is reported."""
+MONTH = 30 * 86400.0
+"""s"""
 NOT_SEEN = "it turned, and its heading is not in the file: the speed cannot be told"
-ROLL_CONFIRMS = 0.67
-"""Standard errors by which a speed must be below normal where the glider rolls otherwise for two dives:
-three to one."""
 FASTER = "faster than ever: the current is wrong, or it is driven harder"
 NEW_FASTER = "faster than before: a new way of flying, or the current is wrong: the next dives will tell"
 NEW_SLOWER = "slower than before, after a change of pitch or ballast: the next dives will tell"
 NEW_WAY = "flies in a new way for three dives: "
-HIDDEN = 0.1
-"""Part of the speed that the glider believes, by which it must be slower to be slower than that."""
-ROLLED, ROLLS = 0.12, 5
-"""rad: a step of the mean roll that speaks for a lost or bent wing; dives that tell the usual roll, and
-samples that tell the roll of a dive."""
 Trim = tuple[float | None, ...]
 """What a pilot chooses of a dive: pitch diving and climbing (rad), volume pumped diving and climbing (m3)."""
-AGREE, ENOUGH = 0.12, 3
-"""Part of it by which speeds of a new way of flying differ at most, and dives in a row that make it one."""
-EXPLAINED = 0.7
-"""Part of the usual speed that is left at least after a change of trim: pitch and ballast take no more."""
-RETRIMMED = (0.08, 0.08, 30e-6, 30e-6)
-"""Change of each number of the trim that was the pilot's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,11 +174,11 @@ class SpeedParams:
     low: float = 0.15
     high: float = 0.75
     learning: RangeParams | None = RangeParams()
-    confidence: float = 1.645
-    gate: float = 4.0
-    least: float = 0.05
-    vague: float = 0.3
-    turned: float = 0.15
+    confidence: float = CONFIDENCE
+    gate: float = GATE
+    least: float = LEAST_ACROSS
+    vague: float = VAGUE
+    turned: float = COMPASS_OFF
 
 
 @dataclass(frozen=True, slots=True)
@@ -315,7 +312,7 @@ def _misfits(state: SpeedState, info: JointInfo) -> tuple[Misfit, ...]:
     rest = info.seen.rest
     if rest is None or info.across is None:
         return state.misfits
-    return (*state.misfits, misfit(rest, info.seen.heading, info.across))[-KEPT:]
+    return (*state.misfits, misfit(rest, info.seen.heading, info.across))[-MISFITS_KEPT:]
 
 
 def _wrong(state: SpeedState, info: JointInfo, params: SpeedParams) -> tuple[Flag | None, str]:
@@ -400,7 +397,7 @@ def _small_losses(
     """Flag 1 where a loss too small for one dive has gone on for several; the state with the sum of it."""
     if not normal.dives or (info.seen.is_free and not info.believes):
         return state, Flag.NORMAL, ""
-    bound = cusum_bound(SLACK, DIVES_A_MONTH / params.joint.alarms_per_month)
+    bound = cusum_bound(SLACK, MONTH / USUAL_DIVE / params.joint.alarms_per_month)
     found = info.estimate
     # a dive that hardly tells the speed adds little, and no dive alone is several
     departure = (1 - found.speed / normal.usual) / max(DEPARTURE, found.own_sigma / normal.usual)
@@ -429,15 +426,15 @@ def _how_slow(
 def _rolls(state: SpeedState, dive: Dive) -> bool:
     """Whether the roll of a dive differs much from the usual one."""
     roll = dive.features.roll_mean
-    if roll is None or dive.n_samples < ROLLS or len(state.rolls) < ROLLS:
+    if roll is None or dive.n_samples < BASELINE_LEAST or len(state.rolls) < BASELINE_LEAST:
         return False
-    return abs(roll - median(state.rolls)) > ROLLED
+    return abs(roll - median(state.rolls)) > ROLL_STEP
 
 
 def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: SpeedParams) -> SpeedState:
     """The state with what a normal dive teaches."""
     roll = dive.features.roll_mean
-    if roll is not None and len(state.rolls) < 3 * ROLLS:
+    if roll is not None and len(state.rolls) < 3 * BASELINE_LEAST:
         state = replace(state, rolls=(*state.rolls, roll))
     own = info.seen.own_speed()
     if own is not None and own[1] < (2 if info.seen.is_free else 1) * OWN_SURE * own[0]:

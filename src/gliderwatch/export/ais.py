@@ -27,7 +27,7 @@ def lines(glider: str, area: DriftEllipse, mmsi: int, now: float) -> list[str]:
         from pyais.encode import encode_dict  # noqa: PLC0415 (an extra)
     except ImportError:
         raise GliderwatchError(
-            "virtual AIS needs pyais, which is not installed: pip install 'gliderwatch[ais]'"
+            "virtual AIS needs pyais, which is not installed: docs/install.md says how"
         ) from None
     if not 990_000_000 <= mmsi <= 999_999_999:
         raise GliderwatchError(

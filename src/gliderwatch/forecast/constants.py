@@ -2,7 +2,7 @@
 
 `docs/next-surfacing.md` says what real missions do, and `benchmarks/surfacing.py` scores a change of them.
 Where no source is named the value is a judgement, and the tests named by `benchmarks/mutations.py` pin what
-it is for. How a current changes is `estimation.flow.FlowParams`.
+it is for. How a current changes is on the page of `sea`.
 """
 
 from __future__ import annotations

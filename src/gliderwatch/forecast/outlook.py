@@ -6,7 +6,8 @@ from math import expm1, sin
 
 import numpy as np
 
-from gliderwatch.estimation.dive_measurement import DRAG_BY_LIFT, OWN, SLIP, USUAL_PITCH
+from gliderwatch.estimation.constants import DRAG_BY_LIFT, USUAL_PITCH
+from gliderwatch.estimation.dive_measurement import OWN, SLIP
 from gliderwatch.estimation.glider import Estimate
 from gliderwatch.estimation.kalman import JointParams, JointState, expected_flow
 from gliderwatch.forecast.constants import VAGUE

@@ -8,8 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
-from gliderwatch.incidents.notices import Aborted, AbortReport, Notice, Resumed
+from gliderwatch.incidents.acknowledgement import Acks, is_taken_on
+from gliderwatch.incidents.notices import Aborted, AbortReport, Notice, Resumed, StillAborted
+from gliderwatch.incidents.send_schedule import next_reminder
 from gliderwatch.model import Aborts, Call, Happened, Happening, Kind, Severity
 
 SAME = 1800.0
@@ -106,11 +109,17 @@ def _is_same(one: AbortReport, other: AbortReport) -> bool:
 
 
 def announce(
-    glider: str, before: tuple[Episode, ...], calls: tuple[Call, ...], now: float
+    glider: str,
+    before: tuple[Episode, ...],
+    calls: tuple[Call, ...],
+    now: float,
+    acks: Acks = MappingProxyType({}),
+    reminder_hours: float | None = None,
 ) -> tuple[tuple[Episode, ...], list[Notice]]:
     """What people have been told of aborts after the messages that are due `now` (s), and these.
 
-    `calls` are those known of the last weeks, in order of time.
+    `calls` are those known of the last weeks, in order of time. Of what nobody has taken on (`acks`) people
+    are reminded after `reminder_hours`.
     """
     episodes, notices = list(before), list[Notice]()
     fresh: dict[int, list[Finding]] = {}
@@ -131,6 +140,9 @@ def announce(
     for k, episode in enumerate(episodes):
         if episode.cleared is None:
             episodes[k], more = _cleared(glider, episode, calls)
+            taken_on = k in fresh or is_taken_on(acks, (episode.id,), episode.severity)
+            if not more and reminder_hours is not None and not taken_on:
+                episodes[k], more = _reminded(glider, episode, calls, reminder_hours)
             notices += more
     return tuple(episodes), notices
 
@@ -171,6 +183,23 @@ def _aborted(glider: str, episode: Episode, new: list[Finding]) -> tuple[Episode
     content = Aborted(tuple(reports), call)
     notice = Notice(identity, episode.id, glider, call.last_t, Kind.ABORT, loud, loud, content)
     return replace(episode, messages=episode.messages + 1, time=call.last_t), notice
+
+
+def _reminded(
+    glider: str, episode: Episode, calls: tuple[Call, ...], hours: float
+) -> tuple[Episode, list[Notice]]:
+    """The episode, and the reminder of it that its last call makes due; what was only noted needs none."""
+    since, call = min(one.t for one in episode.told), max(calls, key=lambda c: c.last_t, default=None)
+    if call is None or episode.severity is Severity.INFO:
+        return episode, []
+    before, age = ((t - since) / 3600 / hours for t in (episode.time, call.last_t))
+    if age < next_reminder(before):
+        return episode, []
+    reports = sorted(episode.told, key=lambda r: (-r.severity, _LOUDEST.index(r.what), r.t))
+    content = StillAborted(tuple(reports), call, (call.last_t - since) / 3600)
+    identity, loud = f"{episode.id}/{episode.messages}", episode.severity
+    notice = Notice(identity, episode.id, glider, call.last_t, Kind.REMINDER, loud, loud, content)
+    return replace(episode, messages=episode.messages + 1, time=call.last_t), [notice]
 
 
 def _cleared(glider: str, episode: Episode, calls: tuple[Call, ...]) -> tuple[Episode, list[Notice]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from gliderwatch.incidents.constants import WORSE_FLOW_ERROR, WORSE_SPEED
@@ -44,6 +44,18 @@ class Ack:
 
 Acks = Mapping[str, Ack]
 """Acknowledgements by the id of their incident."""
+
+
+def is_taken_on(acks: Acks, ids: Iterable[str], severity: Severity) -> bool:
+    """Whether somebody has taken on what goes on under one of some ids and is of a severity; of what is no
+    incident of dives that alone says whether it has grown worse."""
+    found = (ack for identity in ids if (ack := acks.get(identity)) is not None)
+    return any(severity <= ack.severity for ack in found)
+
+
+def acknowledge_thread(identity: str, severity: Severity, by: str, note: str, at: float) -> Ack:
+    """The acknowledgement of what is no incident of dives, as bad as it is at a time (s)."""
+    return Ack(identity, by, note, at, severity, 0.0, severe=False)
 
 
 def acknowledge(incident: Incident, by: str, note: str, at: float) -> Ack:

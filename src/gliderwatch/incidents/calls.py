@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 from gliderwatch.incidents.aborts import NEWS
+from gliderwatch.incidents.acknowledgement import Acks, is_taken_on
 from gliderwatch.incidents.constants import LONGEST_CALL
 from gliderwatch.incidents.notices import CalledWithoutFile, Notice, SendsAgain
 from gliderwatch.incidents.overdue import HOUR, Sign
@@ -55,12 +57,45 @@ def _is_one(before: list[Call], call: Call) -> bool:
     return abs(fix.lat - call.fix.lat) <= _PLACE and abs(fix.lon - call.fix.lon) <= _PLACE
 
 
+@dataclass(frozen=True, slots=True)
+class Announced:
+    """A file whose transfer began in a call: its 8.3 ``name``, and the full name of its ``segment`` (empty:
+    not told), lower case."""
+
+    name: str
+    segment: str
+
+
+def announced_flight(call: Call) -> tuple[Announced, ...]:
+    """The flight files (sbd, mbd, dbd, compressed or not) that were announced in a call.
+
+    The call names one segment in both ways (`unit_1033-2025-022-0-33`, `0103.0033`): from that follow the
+    full names of others of the same mission.
+    """
+    mission = call.segment.rpartition("-")[0].lower()
+    found = []
+    for name in call.announced:
+        stem, _, kind = name.lower().rpartition(".")
+        if kind in ("sbd", "scd", "mbd", "mcd", "dbd", "dcd"):
+            is_of_mission = (
+                mission and stem.isdigit() and len(stem) == len(call.short) and stem[:4] == call.short[:4]
+            )
+            found.append(Announced(name.lower(), f"{mission}-{int(stem[4:])}" if is_of_mission else ""))
+    return tuple(found)
+
+
 def announce(
-    glider: str, before: Empty | None, calls: tuple[Call, ...], signs: tuple[Sign, ...], now: float
+    glider: str,
+    before: Empty | None,
+    calls: tuple[Call, ...],
+    signs: tuple[Sign, ...],
+    now: float,
+    acks: Acks = MappingProxyType({}),
 ) -> tuple[Empty | None, list[Notice]]:
     """What people have been told of calls without a file after the messages due `now` (s), and these.
 
     `calls` are those known of the last weeks, in order of time; `signs` tells of files that came otherwise.
+    What somebody has taken on (`acks`) is not repeated.
     """
     groups = surfacings(calls)
     over = [g for k, g in enumerate(groups) if k + 1 < len(groups) or _is_over(g, now)]
@@ -81,6 +116,8 @@ def announce(
     if not is_due or now - run[-1][-1].last_t >= NEWS:
         return before, []
     loud = Severity.INFO if n < SEVERAL else Severity.WARNING
+    if is_taken_on(acks, (state.id,), loud):
+        return before, []
     content = CalledWithoutFile(tuple(group[-1] for group in run))
     identity, time = f"{state.id}/{state.messages}", content.calls[-1].last_t
     notice = Notice(identity, state.id, glider, time, Kind.CALL, loud, loud, content)

@@ -64,7 +64,7 @@ GONE = 30 * 86400.0
 RECENT = GONE + 2 * 86400.0
 """s: files opened before are no sign of life of the last 30 days; none is open for two days."""
 
-# Where a silent glider drifts (the current forgets in `estimation.flow.FlowParams.memory`)
+# Where a silent glider drifts (the current forgets in `sea.constants.PASSING_MEMORY`)
 FLOW_SIGMA = 0.15
 """m/s, a component: how far current and wind drift come to differ from the last known current. 0.11 is
 sqrt(2) times the 0.08 of the current itself; the rest is allowed for the wind at the surface."""
@@ -95,3 +95,9 @@ WEEK = 7.0
 """and then each time after so many days."""
 SLACK = 0.2
 """Of a day: so much sooner a reminder may come; surfacings do not fall on full days."""
+
+UNTIL_COME = 3600.0
+"""Seconds after a call after which a file that was announced in it has come, or does not."""
+HEALTH_CLEAR_AFTER = 4
+"""Segments or calls in a row in which a rule of health finds nothing that clear its incident: the file and
+the log of two surfacings. One that is at its limit is not told again at each."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from gliderwatch.fleet.advice import Advice
 from gliderwatch.fleet.cross_check import Hypothesis
+from gliderwatch.health.rule import Finding
 from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.model import (
     Assessment,
@@ -88,9 +89,12 @@ class Corrected:
 
 @dataclass(frozen=True, slots=True)
 class Acknowledged:
-    """Somebody (``by``) has taken an incident on, with a ``note``; ``is_undone``: has given it back."""
+    """Somebody (``by``) has taken on what goes on in a ``thread`` of a ``kind`` since ``since`` (s),
+    with a ``note``; ``is_undone``: has given it back."""
 
-    incident: Incident
+    thread: str
+    kind: Kind
+    since: float
     by: str
     note: str
     is_undone: bool
@@ -287,6 +291,18 @@ class Aborted:
 
 
 @dataclass(frozen=True, slots=True)
+class StillAborted:
+    """For so many ``hours`` after what a glider reported it flies no mission of its pilots.
+
+    ``call`` is its last.
+    """
+
+    reports: tuple[AbortReport, ...]
+    call: Call
+    hours: float
+
+
+@dataclass(frozen=True, slots=True)
 class Resumed:
     """The glider flies a mission of its pilots again, as it reported in a call."""
 
@@ -305,6 +321,55 @@ class SendsAgain:
     """The glider sent a file in a call, after several without."""
 
     call: Call
+
+
+# --------------------------------------------------------------------- health
+
+
+@dataclass(frozen=True, slots=True)
+class HealthIncident:
+    """What a rule of health found in segments and calls in a row.
+
+    ``since`` (s) is when it began by the first finding, ``opened_at`` the end of the segment or call that
+    showed it, ``cleared_at`` of the one that cleared it (None: open). ``severity`` is the worst so far.
+    """
+
+    id: str
+    glider: str
+    rule: str
+    severity: Severity
+    since: float
+    opened_at: float
+    cleared_at: float | None
+    worst: Finding
+    last: Finding
+
+
+@dataclass(frozen=True, slots=True)
+class HealthFound:
+    """A rule of health found something, with ``is_worse`` something worse; ``fix`` is the glider's last."""
+
+    incident: HealthIncident
+    is_worse: bool
+    fix: Fix | None
+
+
+@dataclass(frozen=True, slots=True)
+class HealthReminder:
+    """What a rule found is so for so many ``hours``, and nobody has taken it on."""
+
+    incident: HealthIncident
+    hours: float
+    fix: Fix | None
+
+
+@dataclass(frozen=True, slots=True)
+class HealthOver:
+    """The rule finds nothing any more; ``is_withdrawn``: as known now it never did."""
+
+    incident: HealthIncident
+    is_withdrawn: bool
+    fix: Fix | None
 
 
 # -------------------------------------------------------- the files of a glider
@@ -370,6 +435,10 @@ Content = (
     | Resumed
     | CalledWithoutFile
     | SendsAgain
+    | StillAborted
+    | HealthFound
+    | HealthReminder
+    | HealthOver
     | Irregularity
     | DiffersFromNeighbours
 )

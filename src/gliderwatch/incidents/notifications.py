@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from math import ceil
 from types import MappingProxyType
 from typing import Protocol
 
 from gliderwatch.fleet.advice import Advice
 from gliderwatch.incidents.aborts import Episode
-from gliderwatch.incidents.acknowledgement import Acks
-from gliderwatch.incidents.calls import Empty
-from gliderwatch.incidents.constants import FLOW_CHANGE, MARKS, NEWS, REGIME_DIVES, SLACK, SPEED_CHANGE, WEEK
+from gliderwatch.incidents.acknowledgement import Acks, is_taken_on
+from gliderwatch.incidents.calls import SEVERAL, Empty
+from gliderwatch.incidents.constants import FLOW_CHANGE, NEWS, REGIME_DIVES, SPEED_CHANGE
+from gliderwatch.incidents.health import HealthThread
 from gliderwatch.incidents.neighbours import Comparison
 from gliderwatch.incidents.notices import (
     Cleared,
@@ -25,6 +25,7 @@ from gliderwatch.incidents.notices import (
     Surfaced,
 )
 from gliderwatch.incidents.overdue import Silence
+from gliderwatch.incidents.send_schedule import next_reminder
 from gliderwatch.incidents.situation import SituationFacts, next_surfacing, situation
 from gliderwatch.incidents.unjudged import Unknown
 from gliderwatch.layers.advice import LayerAdvice
@@ -61,7 +62,8 @@ class NotificationState:
     (`incidents.overdue`), ``unknown`` of dives that could not be judged (`incidents.unjudged`), ``aborts`` of
     aborts (`incidents.aborts`), ``empty`` of calls without a file (`incidents.calls`), ``neighbours`` how it
     stood to them (`incidents.neighbours`), ``irregularities`` the ids of those of its files, ``renewed`` the
-    dive (s) of the last notice of a new way of flying.
+    dive (s) of the last notice of a new way of flying, ``health`` what rules of health found
+    (`incidents.health`).
     """
 
     threads: tuple[Thread, ...] = ()
@@ -73,6 +75,7 @@ class NotificationState:
     irregularities: tuple[str, ...] = ()
     neighbours: Comparison | None = None
     renewed: float | None = None
+    health: tuple[HealthThread, ...] = ()
 
 
 class IncidentFacts(SituationFacts, Protocol):
@@ -173,12 +176,48 @@ def unacknowledged(said: NotificationState, incidents: tuple[Incident, ...], ack
     }
     if said.unknown is not None and not said.unknown.is_over:
         threads.add(said.unknown.id)
-    threads |= {episode.id for episode in said.aborts if episode.cleared is None}
-    if said.empty is not None and not said.empty.is_over:
-        threads.add(said.empty.id)
+    threads |= {t.id for t in open_threads(said) if not is_taken_on(acks, (t.id,), t.severity)}
     if said.neighbours is not None and said.neighbours.id:
         threads.add(said.neighbours.id)
     return frozenset(threads | {silence.id for silence in said.silences if silence.called is None})
+
+
+@dataclass(frozen=True, slots=True)
+class OpenThread:
+    """What goes on and is no incident of dives: an abort, calls without a file, what a rule of health found.
+
+    ``since`` (s); ``about`` in a few words.
+    """
+
+    id: str
+    kind: Kind
+    severity: Severity
+    since: float
+    about: str
+
+    @property
+    def glider(self) -> str:
+        """Whose it is."""
+        return self.id.split("/", 1)[0]
+
+
+def open_threads(said: NotificationState) -> tuple[OpenThread, ...]:
+    """The aborts, calls without a file and findings of health that were reported and go on."""
+    aborts = (
+        OpenThread(e.id, Kind.ABORT, e.severity, e.told[0].t, e.told[0].cause or str(e.told[0].what))
+        for e in said.aborts
+        if e.cleared is None and e.told
+    )
+    health = (
+        OpenThread(t.id, Kind.HEALTH, t.reported.severity, t.reported.since, t.reported.last.text)
+        for t in said.health
+        if not t.is_over
+    )
+    empty, found = said.empty, list[OpenThread]()
+    if empty is not None and not empty.is_over:
+        severity = Severity.INFO if empty.told < SEVERAL else Severity.WARNING
+        found = [OpenThread(empty.id, Kind.CALL, severity, empty.since, f"{empty.told} without a file")]
+    return (*aborts, *found, *health)
 
 
 def as_notified(said: NotificationState, known: IncidentFacts) -> NotificationState:
@@ -293,17 +332,6 @@ def _continued(
             hours = (latest.t_surface - now.since) / 3600
             return _message(thread, StillOpen(now, latest, hours, situation(known, now.id)), latest)
     return thread, []
-
-
-def next_reminder(age: float) -> float:
-    """The age (days, or what is set in their place) at which an incident is brought to mind that was last
-    told of at an ``age``: at 1, 2, 4 and 7 days, then each week, and never within a day of that.
-
-    >>> [next_reminder(age) for age in (0.0, 0.5, 1.0, 2.1, 4.2, 7.0)]
-    [1.0, 2.0, 2.0, 4.0, 7.0, 14.0]
-    """
-    soonest = age + 1 - SLACK
-    return next((mark for mark in MARKS if mark >= soonest), WEEK * max(ceil(soonest / WEEK), 1))
 
 
 def _changed(told: Assessment, now: Assessment) -> bool:

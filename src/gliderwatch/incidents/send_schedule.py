@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime, time, timedelta, tzinfo
-from math import inf
+from math import ceil, inf
 
+from gliderwatch.incidents.constants import MARKS, SLACK, WEEK
 from gliderwatch.model import Alert, Severity
 
 
@@ -119,3 +120,14 @@ def deliveries(
         if one is not None:
             found[channel] = one
     return found
+
+
+def next_reminder(age: float) -> float:
+    """The age (days, or what is set in their place) at which an incident is brought to mind that was last
+    told of at an ``age``: at 1, 2, 4 and 7 days, then each week, and never within a day of that.
+
+    >>> [next_reminder(age) for age in (0.0, 0.5, 1.0, 2.1, 4.2, 7.0)]
+    [1.0, 2.0, 2.0, 4.0, 7.0, 14.0]
+    """
+    soonest = age + 1 - SLACK
+    return next((mark for mark in MARKS if mark >= soonest), WEEK * max(ceil(soonest / WEEK), 1))

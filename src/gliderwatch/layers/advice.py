@@ -8,9 +8,9 @@ import numpy as np
 
 from gliderwatch.layers.band import Band, Method, Mode, Tracking, follow
 from gliderwatch.layers.composite import Layer
-from gliderwatch.layers.constants import LEAST_BAND
+from gliderwatch.layers.constants import LEAST_BAND, WRONG_ECHOES
 from gliderwatch.layers.water import casts_of
-from gliderwatch.model import Segment
+from gliderwatch.model import Array, Segment, readonly
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,11 +91,15 @@ def advise(tracking: Tracking, segment: Segment, t: float, params: LayerParams) 
 
 
 def _floor(segment: Segment) -> float | None:
-    """The least depth of the bottom (m) that was measured in a segment; None where none was."""
+    """The shallow end of the depths of the bottom (m) measured in a segment; None where none was."""
     found = list[float]()
     water, altitude, depth = (segment.get(name) for name in ("water_depth", "altitude", "depth"))
     if len(water):
-        found.append(float(water.v.min()))
+        found.append(_shallow(water.v))
     if len(altitude) and len(depth):
-        found.append(float((altitude.v + np.interp(altitude.t, depth.t, depth.v)).min()))
+        found.append(_shallow(readonly(altitude.v + np.interp(altitude.t, depth.t, depth.v))))
     return min(found, default=None)
+
+
+def _shallow(bottoms: Array) -> float:
+    return float(np.quantile(bottoms, WRONG_ECHOES, method="lower"))

@@ -54,3 +54,5 @@ LATITUDE = 45.0
 """Degrees: where depths are made of pressures; elsewhere they are 0.3 % off, less than a sample's spacing."""
 LEAST_BAND = 3.0
 """m: a band of less height is none: a Slocum overshoots its turns by 1 to 3 m."""
+WRONG_ECHOES = 0.1
+"""Part of the depths of the bottom that may be too shallow: usf-sam had such, by 4 m, one in ten."""

@@ -7,9 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from gliderwatch.incidents.notices import Aborted, AbortReport, CalledWithoutFile, Resumed, SendsAgain
-from gliderwatch.messages.formatting import clean, place, short_place, utc
-from gliderwatch.messages.lines import Pairs, map_of, name_of, silence
+from gliderwatch.incidents.notices import (
+    Aborted,
+    AbortReport,
+    CalledWithoutFile,
+    Resumed,
+    SendsAgain,
+    StillAborted,
+)
+from gliderwatch.messages.formatting import clean, duration, place, short_place, utc
+from gliderwatch.messages.lines import Pairs, map_of, name_of, take_on_thread
 from gliderwatch.messages.template import Page, Text, titled
 from gliderwatch.model import Call, Happening
 
@@ -57,19 +64,34 @@ _WORDS = {
 def aborted(glider: str, content: Aborted) -> Text:
     """The glider reported in a call that something is wrong."""
     main, name, call = content.reports[0], name_of(glider), content.call
-    sure = (
-        "Not sure that it still matters: it is from before" if main.is_history else "Sure (100 %): it said so"
-    )
-    others = "".join(f" {_sentence(one).capitalize()}." for one in content.reports[1:])
+    sure = "Not sure that it still matters: an old one" if main.is_history else "Sure (100 %): it said so"
+    others = "".join(f" Also: {_sentence(one)}." for one in content.reports[1:])
     since = "" if main.what is Happening.ABORTING else f", since {utc(main.t)}"
     first = f"{name}: {_sentence(main)}{since}. {sure}.{others}"
     page = Page(
         (first, _where(call), _next(call)),
         _facts(call),
         do=_checks(content.reports),
-        links=(*_map(call), *silence(glider)),
+        links=(*_map(call), *take_on_thread(glider)),
     )
     return titled(glider, _title(main)), page
+
+
+def still_aborted(glider: str, content: StillAborted) -> Text:
+    """The glider still flies no mission of its pilots: five lines."""
+    main, name, call = content.reports[0], name_of(glider), content.call
+    since = duration(3600 * content.hours)
+    (label, take), *_ = take_on_thread(glider)
+    page = Page(
+        (
+            f"{name}: for {since} now it flies no mission of yours, since {utc(main.t)}.",
+            f"As bad as before: {_sentence(main)}.",
+            _where(call),
+            _next(call),
+            f"{label}, if nobody has: {take}",
+        )
+    )
+    return titled(glider, f"STILL {_title(main)}"), page
 
 
 def resumed(glider: str, content: Resumed) -> Text:
@@ -106,7 +128,7 @@ def without_file(glider: str, content: CalledWithoutFile) -> Text:
             else "See whether the login script sends files.",
             "Ask it for its files in the next call.",
         ),
-        (*_map(last), *silence(glider)),
+        (*_map(last), *take_on_thread(glider)),
     )
     return titled(glider, title), page
 

@@ -156,16 +156,16 @@ def corrected(glider: str, content: Corrected) -> Text:
 
 def acknowledged(glider: str, content: Acknowledged) -> Text:
     """Somebody has taken an incident on, or given it back: for the others."""
-    incident, who = content.incident, clean(content.by, 40)
+    who, what = clean(content.by, 40), INCIDENTS.get(content.kind, str(content.kind))
     note = f": {clean(content.note)}" if content.note else ""
-    about = f"the {_name(incident)} of {name_of(glider)} since {utc(incident.since)}"
+    about = f"the {what} of {name_of(glider)} since {utc(content.since)}"
     if content.is_undone:
         first, done = f"{who} has given back {about}{note}. Nobody is on it.", f"given back by {who}"
-        links: tuple[tuple[str, str], ...] = (("Take it on", command(f"ack {incident.id}")),)
+        links: tuple[tuple[str, str], ...] = (("Take it on", command(f"ack {content.thread}")),)
     else:
         first, done = f"{who} has taken on {about}{note}.", f"{who} is on it"
-        links = (("To undo it", command(f"ack {incident.id} --undo")),)
-    return titled(glider, done, f" ({_name(incident)})"), Page((first,), links=links)
+        links = (("To undo it", command(f"ack {content.thread} --undo")),)
+    return titled(glider, done, f" ({what})"), Page((first,), links=links)
 
 
 def surfaced(glider: str, content: Surfaced) -> Text:

@@ -86,6 +86,11 @@ def take_on(incident: Incident, situation: Situation) -> Pairs:
     return (("Take it on", command(f"ack {what}")),)
 
 
+def take_on_thread(glider: str) -> Pairs:
+    """How to take on what is no incident of dives; of several that are open the command names the ids."""
+    return (("Take it on", command(f"ack {glider}")),)
+
+
 def silence(glider: str) -> Pairs:
     """How to keep a glider quiet while somebody works on what is no incident."""
     return (("Quiet while you work on it", command(f"mute {glider} --hours 6")),)

@@ -12,6 +12,7 @@ from typing import Any
 from gliderwatch.incidents import notices as n
 from gliderwatch.messages import (
     call_text,
+    health_text,
     incident_text,
     irregularity_text,
     neighbours_text,
@@ -39,6 +40,10 @@ _WRITERS: dict[type, Callable[[str, Any], Text]] = {
     n.Resumed: call_text.resumed,
     n.CalledWithoutFile: call_text.without_file,
     n.SendsAgain: call_text.sends_again,
+    n.StillAborted: call_text.still_aborted,
+    n.HealthFound: health_text.found,
+    n.HealthReminder: health_text.reminder,
+    n.HealthOver: health_text.over,
     n.DiffersFromNeighbours: neighbours_text.differs,
     n.Irregularity: irregularity_text.irregular,
 }

@@ -231,7 +231,7 @@ def _situation(dive: Assessment, *earlier: float) -> Situation:
 
 def _acknowledged(now: float) -> Alert:
     incident = _incident(Kind.ANOMALY, _at(_SLOW, now - _HOUR), Severity.CRITICAL)
-    content = Acknowledged(incident, "Ann", "boat leaves at 6", False)
+    content = Acknowledged(incident.id, incident.kind, incident.since, "Ann", "boat leaves at 6", False)
     return _message(Kind.ACKNOWLEDGED, Severity.INFO, now, content)
 
 

@@ -177,7 +177,7 @@ def command(words: str) -> str:
 
 def escalated(alert: Alert, waited: float) -> Alert:
     """The message, for who is notified of it after so long (s) without an acknowledgement."""
-    kinds = (Kind.OVERDUE, Kind.UNKNOWN, Kind.ABORT, Kind.CALL, Kind.NEIGHBOURS)
+    kinds = (Kind.OVERDUE, Kind.UNKNOWN, Kind.NEIGHBOURS)
     muted = tuple(f"{alert.glider}/{kind}/" for kind in kinds)
     is_muted = alert.incident.startswith(muted)  # there is no incident to acknowledge
     words = f"mute {alert.glider} --hours 6" if is_muted else f"ack {alert.incident.rstrip('+')}"

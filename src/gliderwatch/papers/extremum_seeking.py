@@ -61,27 +61,21 @@ def step(before: Estimate, d: float, gain: float, y: float, q: float, r: float) 
     """One control step of the filter (004 eqs. 5a to 5c): prediction by perturbation `d` (m), update by `y`.
 
     Unscented transform with alpha = 1, beta = kappa = 0 (004 Table 1): the centre has no weight, four points
-    sqrt(2) standard deviations away have 1/4 each. Process noise `q` on the gradient alone. Raises ValueError
-    where the covariance is no covariance any more.
+    sqrt(2) standard deviations away have 1/4 each. Of this model the sums over them are known: below.
+    Process noise `q` on the gradient alone. Raises ValueError where the covariance is none any more.
     """
-    det = before.p_jj - before.p_gj**2 / before.p_gg if before.p_gg > 0 else -1.0
-    if det < 0:
+    g, p_gg = before.gradient, before.p_gg
+    if p_gg <= 0 or before.p_jj * p_gg < before.p_gj**2:
         raise ValueError("the covariance of the filter is not positive: R and Q must be above zero")
-    a = math.sqrt(2 * before.p_gg)
-    b = before.p_gj / before.p_gg * a
-    c = math.sqrt(2 * det)
-    points = [(before.gradient + dg, before.cost + dj) for dg, dj in ((a, b), (-a, -b), (0.0, c), (0.0, -c))]
-    moved = [(g, j + (d + gain * g) * g) for g, j in points]
-    mean_g = sum(g for g, _ in moved) / 4
-    mean_j = sum(j for _, j in moved) / 4
-    p_gg = sum((g - mean_g) ** 2 for g, _ in moved) / 4 + q
-    p_gj = sum((g - mean_g) * (j - mean_j) for g, j in moved) / 4
-    p_jj = sum((j - mean_j) ** 2 for _, j in moved) / 4
+    slope = d + 2 * gain * g
+    mean_j = before.cost + d * g + gain * (g**2 + p_gg)
+    p_jj = before.p_jj + 2 * slope * before.p_gj + slope**2 * p_gg + (gain * p_gg) ** 2
+    p_gj = before.p_gj + slope * p_gg
     s = p_jj + r
     k_g, k_j = p_gj / s, p_jj / s
     error = y - mean_j
     return Estimate(
-        mean_g + k_g * error, mean_j + k_j * error, p_gg - k_g**2 * s, p_gj - k_g * k_j * s, p_jj - k_j**2 * s
+        g + k_g * error, mean_j + k_j * error, p_gg + q - k_g**2 * s, p_gj - k_g * k_j * s, p_jj - k_j**2 * s
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gliderwatch.forecast.constants import CHI2_COVERED
 from gliderwatch.model import Array, Assessment, NextSurfacing
 from gliderwatch.navigation.geodesy import to_plane
 from gliderwatch.score.measures import Interval, NextResult, Record, bootstrap
@@ -88,9 +89,6 @@ def _speed_score(estimator: str, sea: str, is_faulty: bool, gliders: Sequence[Re
 # ----------------------------------------
 # How well the next surfacing was told: time, place and their 95 %.
 
-INSIDE = 5.991
-"""Chi-square of two numbers that 95 % are below."""
-
 
 @dataclass(frozen=True, slots=True)
 class NextScore:
@@ -156,7 +154,7 @@ def _result(expected: NextSurfacing, before: _Fix, start: _Fix, end: _Fix) -> Ne
         late=late,
         miss=float(np.hypot(*miss)),
         persistence=float(np.hypot(*(way - again))),
-        in_ellipse=bool(miss @ np.linalg.solve(cov, miss) < INSIDE),
+        in_ellipse=bool(miss @ np.linalg.solve(cov, miss) < CHI2_COVERED),
         in_time=abs(late) < 1.96 * expected.t_sigma,
         hours=(end.t - start.t) / 3600,
     )

@@ -10,6 +10,26 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gliderwatch.model import Array, readonly
+from gliderwatch.sea.constants import (
+    APART,
+    ENOUGH,
+    EVEN,
+    FAR,
+    FIRST_SCALE,
+    FIT_MEMORY,
+    INTERVALS_KEPT,
+    MARGIN,
+    PLAIN_MEMORIES,
+    PLAIN_STEPS,
+    SCALE_FEW,
+    SCALE_MEMORY,
+    SCALES,
+    TAIL,
+    TIDAL_AMPLITUDES,
+    TIDAL_CHANGE,
+    TIDAL_MEMORIES,
+    TIDAL_STEPS,
+)
 from gliderwatch.sea.tides import HOUR, Constituent, aliasing
 
 # ----------------------------------------
@@ -155,15 +175,6 @@ def learn_belief(
 # end elsewhere on another run, and what is uncertain in the parameters is part of the forecast's covariance.
 # The grid holds ratios; the scale of all variances is learnt for each set from its own innovations.
 
-MEMORY = 100
-"""Dives after which what a set has foretold counts for a third: seas change along the way."""
-TAIL = 6.0
-"""Degrees of freedom of Student's t by which innovations are judged: one wild dive must not decide."""
-SCALE_MEMORY, FEW = 40, 6
-"""Dives over which the scale is learnt, and how many its first guess counts for."""
-FAR, SCALE, FIRST = 9.0, (0.1, 9.0), 1.5
-"""An innovation's normalised square counts as this at most; bounds of the scale, and its first guess:
-little is known at first, and forecasts should say so."""
 STRENGTH = {
     Constituent.M2: 1.0,
     Constituent.S2: 0.46,
@@ -228,7 +239,9 @@ def grid(
 def init_bank(t: float, params: Parameters) -> Bank:
     """Before any dive, at a time (s)."""
     belief, sets = init_belief(t, params), len(params.sigma)
-    return Bank(t, belief.mean, _packed(belief.cov), readonly(np.zeros(sets)), readonly(np.full(sets, FIRST)))
+    return Bank(
+        t, belief.mean, _packed(belief.cov), readonly(np.zeros(sets)), readonly(np.full(sets, FIRST_SCALE))
+    )
 
 
 def belief(bank: Bank) -> Belief:
@@ -258,8 +271,8 @@ def learn_bank(
     square = np.sum((current - each.mean) ** 2, axis=1) / variance
     likelihood = -np.log(variance) - (TAIL + 2) / 2 * np.log1p(square / TAIL)
     surprise = np.minimum(square / 2, FAR) - 1
-    scale = np.clip(bank.scale * (1 + surprise / min(dives + 1 + FEW, SCALE_MEMORY)), *SCALE)
-    fit = bank.fit * (1 - 1 / MEMORY) + likelihood
+    scale = np.clip(bank.scale * (1 + surprise / min(dives + 1 + SCALE_FEW, SCALE_MEMORY)), *SCALES)
+    fit = bank.fit * (1 - 1 / FIT_MEMORY) + likelihood
     learnt = Bank(end, after.mean, _packed(after.cov), readonly(fit), readonly(scale))
     return learnt, _mixed(bank, each.mean, each.var * bank.scale)
 
@@ -292,18 +305,8 @@ def _packed(cov: Array) -> Array:
 # they have clearly beaten persistence. The state is a value, and a function of the dives so far.
 
 TIDES = (Constituent.M2, Constituent.S2, Constituent.K1, Constituent.O1)
-PLAIN_GRID = grid((0.015, 0.04, 0.12), [h * HOUR for h in (10, 30, 100, 1000)], ((0.0, 0.0),), ())
-TIDAL_GRID = grid((0.02, 0.08), [h * HOUR for h in (30, 300)], ((0.05, 0.1), (0.2, 0.1)), TIDES)
-APART = 3 * 86400.0
-"""Seconds without a current after which the sea is taken for unknown."""
-FORGET = 1 / 100
-"""Part of the score that is forgotten with each dive."""
-ENOUGH, MARGIN = 6.0, 2.0
-"""Dives that a score needs, and by how many standard errors tides have to be better than persistence."""
-RECENT = 8
-"""Dives whose intervals say how often the glider surfaces."""
-EVEN = 0.1
-"""Intervals that differ by more than this part are uneven: then no tide hides behind them."""
+PLAIN_GRID = grid(PLAIN_STEPS, PLAIN_MEMORIES, ((0.0, 0.0),), ())
+TIDAL_GRID = grid(TIDAL_STEPS, TIDAL_MEMORIES, [(size, TIDAL_CHANGE) for size in TIDAL_AMPLITUDES], TIDES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -391,8 +394,8 @@ def learn(state: Currents, start: float, end: float, current: Array, sigma: floa
         end=end,
         dives=dives + 1,
         filters=Filters(plain, tidal, readonly(current)),
-        intervals=(*state.intervals, *between)[-RECENT:],
-        durations=(*state.durations, end - begin)[-RECENT:],
+        intervals=(*state.intervals, *between)[-INTERVALS_KEPT:],
+        durations=(*state.durations, end - begin)[-INTERVALS_KEPT:],
     )
 
 
@@ -434,7 +437,7 @@ def forecasts(state: Currents, start: float, end: float) -> dict[str, Mixture] |
 
 def notes(state: Currents) -> tuple[str, ...]:
     """What the glider's surfacing interval hides of the tides, once it is known to be even."""
-    if len(state.intervals) < RECENT:
+    if len(state.intervals) < INTERVALS_KEPT:
         return ()
     usual = float(np.median(state.intervals))
     if np.abs(np.array(state.intervals) / usual - 1).max() > EVEN:
@@ -444,7 +447,7 @@ def notes(state: Currents) -> tuple[str, ...]:
 
 def _scored(score: Score, persistence: float, residual: float, tides: float) -> Score:
     """The score after one more dive's squared errors (m2/s2)."""
-    kept, gain = 1 - FORGET, persistence - tides
+    kept, gain = 1 - 1 / FIT_MEMORY, persistence - tides
     return Score(
         dives=kept * score.dives + 1,
         persistence=kept * score.persistence + persistence,

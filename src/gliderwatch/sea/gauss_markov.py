@@ -27,6 +27,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gliderwatch.model import Array, readonly
+from gliderwatch.sea.constants import (
+    CURRENT_SCALE,
+    INERTIAL,
+    INERTIAL_MEMORY,
+    LASTING_MEMORY,
+    LASTING_SIZE,
+    PASSING,
+    PASSING_MEMORY,
+    TIDE_K1,
+    TIDE_LEAST,
+    TIDE_M2,
+    TIDE_N2,
+    TIDE_O1,
+    TIDE_S2,
+    TIDE_WANDER,
+)
 from gliderwatch.sea.tides import Constituent
 
 HOUR, DAY = 3600.0, 86400.0
@@ -59,22 +75,22 @@ class FlowParams:
     currents differ by their own size.
     """
 
-    lasting: float = 0.3
-    lasting_memory: float = 18 * DAY
-    passing: float = 0.08
-    memory: float = 30 * HOUR
-    inertial: float = 0.06
-    inertial_memory: float = 3 * DAY
+    lasting: float = LASTING_SIZE
+    lasting_memory: float = LASTING_MEMORY
+    passing: float = PASSING
+    memory: float = PASSING_MEMORY
+    inertial: float = INERTIAL
+    inertial_memory: float = INERTIAL_MEMORY
     tides: tuple[Tide, ...] = (
-        Tide(Constituent.M2.omega, 0.25),
-        Tide(Constituent.S2.omega, 0.12),
-        Tide(Constituent.N2.omega, 0.06),
-        Tide(Constituent.K1.omega, 0.15),
-        Tide(Constituent.O1.omega, 0.12),
+        Tide(Constituent.M2.omega, TIDE_M2),
+        Tide(Constituent.S2.omega, TIDE_S2),
+        Tide(Constituent.N2.omega, TIDE_N2),
+        Tide(Constituent.K1.omega, TIDE_K1),
+        Tide(Constituent.O1.omega, TIDE_O1),
     )
-    tide_wander: float = 0.08
-    tide_least: float = 0.005
-    scale: float = 60e3
+    tide_wander: float = TIDE_WANDER
+    tide_least: float = TIDE_LEAST
+    scale: float = CURRENT_SCALE
 
     @property
     def parts(self) -> int:
@@ -144,13 +160,13 @@ def passage(gap: float, dive: float, lat: float, q: Array, params: FlowParams) -
     a = rates(lat, params)
     kept = np.exp(a * gap)
     gained = q * _squared(a, gap)
-    phi, integral = np.exp(a * dive), _integral(a, dive)
-    mean, cross, own = integral / dive, *_wandered(a, dive)
+    phi, square, integral = np.exp(a * dive), _squared(a, dive), _integral(a, dive)
+    mean, cross, own = integral / dive, *_wandered(a, dive, square, integral)
     n, m = params.size, params.parts
     matrix, noise, each = np.zeros((n, n)), np.zeros((n, n)), np.arange(m)
     _put(matrix, phi * kept, each, each)
     _put(matrix, mean * kept, m, each)
-    _put(noise, q * _squared(a, dive) + gained * np.abs(phi) ** 2, each, each)
+    _put(noise, q * square + gained * np.abs(phi) ** 2, each, each)
     shared = q * cross / dive + gained * mean * np.conj(phi)
     _put(noise, shared, m, each)
     _put(noise, np.conj(shared), each, m)
@@ -187,10 +203,12 @@ def _integral(a: Complex, t: float) -> Complex:
     return np.asarray(np.where(np.abs(a * t) < _SMALL, t * (1 + a * t / 2), np.expm1(a * t) / a))
 
 
-def _wandered(a: Complex, t: float) -> tuple[Complex, Array]:
-    """Covariance of the integral of what chance adds with that itself, and its variance, at unit
-    intensity."""
-    square, linear, small = _squared(a, t), _integral(a, t), np.abs(a * t) < _SMALL
+def _wandered(a: Complex, t: float, square: Array, linear: Complex) -> tuple[Complex, Array]:
+    """Covariance of the integral of what chance adds with that itself, and its variance, at unit intensity.
+
+    ``square`` and ``linear`` are `_squared` and `_integral` over ``t``.
+    """
+    small = np.abs(a * t) < _SMALL
     cross = np.where(small, t**2 / 2, (square - np.conj(linear)) / a)
     own = np.where(small, t**3 / 3, (square - 2 * linear.real + t) / np.abs(a) ** 2)
     return cross, own

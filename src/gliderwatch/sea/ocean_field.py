@@ -11,13 +11,8 @@ from datetime import UTC, datetime
 import numpy as np
 
 from gliderwatch.model import Array, Fix, readonly
+from gliderwatch.sea.constants import POINTS, STALE, WET
 
-STALE = 24 * 3600.0
-"""Seconds beyond the last time of a field, or between two times of it, after which it is not believed."""
-WET = 0.5
-"""Part of a place's weight that must be water: nearer to land the field is not believed."""
-POINTS = 8
-"""Places along the way of a dive at which a field is read."""
 Flow = tuple[float, float]
 
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from gliderwatch.errors import GliderwatchError, Quarantine, Retry
 from gliderwatch.model import Array, readonly
-from gliderwatch.sea.ocean_field import STALE, Field
+from gliderwatch.sea.constants import FASTEST_CURRENT, STALE
+from gliderwatch.sea.ocean_field import Field
 
 STANDARD = (
     ("eastward_sea_water_velocity", "northward_sea_water_velocity"),
@@ -25,8 +26,6 @@ STANDARD = (
 COMMON = (("uo", "vo"), ("water_u", "water_v"), ("u", "v"))
 """Names of variables that are tried where no standard name helps."""
 TO_SI = {"m/s": 1.0, "cm/s": 0.01}
-FASTEST = 10.0
-"""m/s: no current is faster; above it a value is a fill value that the file does not call one."""
 MOST = 250e6
 """Numbers in a component that are read (1 GB would be half of it)."""
 AXES = {
@@ -288,4 +287,4 @@ def _values(path: Path, current: xr.DataArray, order: Sequence[Any]) -> Array:
     if short not in TO_SI:
         raise Quarantine(f"{path}: {current.name} is in {units!r}: convert it to m s-1, e.g. with `ncap2`")
     values = np.asarray(current.transpose(*order).values, dtype=np.float64) * TO_SI[short]
-    return np.where(np.abs(values) <= FASTEST, values, np.nan)
+    return np.where(np.abs(values) <= FASTEST_CURRENT, values, np.nan)

@@ -6,13 +6,9 @@ import math
 from collections.abc import Sequence
 from enum import StrEnum
 
+from gliderwatch.sea.constants import FAINT, NEAR, OFTEN
+
 HOUR = 3600.0
-NEAR = 0.05
-"""Half periods by which an interval may miss a whole number of them and still show one quadrature only."""
-OFTEN = 0.42
-"""Periods between surfacings at which a tide is well seen: clearly less than half a period."""
-FAINT = 0.2
-"""Part of a tide that is left in the mean over a dive, below which it is lost in the noise."""
 
 
 class Constituent(StrEnum):

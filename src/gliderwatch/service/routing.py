@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 
 from gliderwatch.config import Config, Recipient
+from gliderwatch.health.rule import Limits
+from gliderwatch.health.rules import usual_limits
 from gliderwatch.incidents.notifications import NotificationState, unacknowledged
 from gliderwatch.incidents.send_schedule import Standing, Wait, deliveries
 from gliderwatch.model import Alert, Kind, Severity
@@ -16,11 +18,13 @@ from gliderwatch.store.state_file import Store
 @dataclass(frozen=True, slots=True)
 class Routing:
     """Who is told: ``channels`` of an alert (a mapping says what they wait for), of which gliders
-    surfacing notices are wanted, and how the silence of a glider is taken."""
+    surfacing notices are wanted, how the silence of a glider is taken, and the ``limits`` of its rules of
+    health."""
 
     channels: Callable[[Alert], Iterable[str]]
     notices: Callable[[str], bool]
     attention: Callable[[str], Attention] = field(default=lambda glider: Attention())
+    limits: Callable[[str], Mapping[str, Limits]] = field(default=lambda glider: usual_limits())
 
 
 # ----------------------------------------
@@ -37,6 +41,7 @@ def routing_of(config: Config) -> Routing:
         channels=lambda alert: channels(alert, config),
         notices=lambda glider: any(glider in r.surfacing for r in config.recipients.values()),
         attention=config.attention,
+        limits=config.health,
     )
 
 

@@ -14,8 +14,9 @@ from queue import SimpleQueue
 import structlog
 
 from gliderwatch.config import Config, expand
+from gliderwatch.delivery import links
 from gliderwatch.delivery.channels import Channel
-from gliderwatch.delivery.dispatcher import Dispatcher
+from gliderwatch.delivery.dispatcher import Dispatcher, Sender
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.model import Segment
 from gliderwatch.sea.ocean_field import Field
@@ -152,18 +153,23 @@ def build(
     workers: int,
     before: Runtime | None = None,
 ) -> Runtime:
-    """The parts of a configuration, not started. Raises ConfigError where a secret is missing.
+    """The parts of a configuration, not started.
+
+    Raises ConfigError where a secret is missing, GliderwatchError where links cannot be signed.
 
     With the channels of the parts before their dispatcher goes on: a message that is on its way when the
     configuration is read again is then not sent a second time. Their decoder goes on always, with its worker
     processes.
     """
     urls = {name: config.channel_url(name).get_secret_value() for name in config.channels}
-    if before is not None and before.urls == urls:
+    public = config.web.public_url
+    if before is not None and before.urls == urls and before.config.web.public_url == public:
         dispatcher = before.dispatcher
     else:
         state = Path(config.state.path)
-        channels = {name: Channel(name, url) for name, url in urls.items()}
+        channels: dict[str, Sender] = {name: Channel(name, url) for name, url in urls.items()}
+        if public is not None:
+            channels = links.linked(channels, str(public), state)
         dispatcher = Dispatcher(lambda: Outbox(state), channels, time.time, wake)
     watcher = Watcher(
         config.dockserver.roots,

@@ -10,9 +10,10 @@ from gliderwatch.errors import GliderwatchError, NotAssessed
 from gliderwatch.fleet.constants import CHECK_WINDOW
 from gliderwatch.fleet.cross_check import cross_check, current_of
 from gliderwatch.fleet.flow import DiveCurrent
-from gliderwatch.incidents import aborts, irregularities, neighbours, overdue, unjudged
+from gliderwatch.health.readings import of_call, of_segment
+from gliderwatch.incidents import aborts, health, irregularities, neighbours, overdue, unjudged
 from gliderwatch.incidents import calls as without_files
-from gliderwatch.incidents.acknowledgement import with_mute
+from gliderwatch.incidents.acknowledgement import Acks, with_mute
 from gliderwatch.incidents.constants import GONE
 from gliderwatch.incidents.notices import Fleet, Notice
 from gliderwatch.incidents.notifications import NotificationState, due_notifications
@@ -20,6 +21,7 @@ from gliderwatch.incidents.send_schedule import AT_ONCE, Wait
 from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.messages.notice_text import render
 from gliderwatch.model import Alert, Assessment, Segment, SegmentId
+from gliderwatch.navigation.clock import moved
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
 from gliderwatch.sea.ocean_field import Field
@@ -85,6 +87,8 @@ def process_file(
         file = replace(file, status=Status.TAKEN, reason="")
         store.note(file, now)
         assessments, state = _run(store, segment, params, stopping, ocean, layers)
+        right = moved(segment, store.segments.offset(segment.id))  # by a clock that is right
+        store.health.put(glider, right.id.name, right.last_t, of_segment(right))
         if fields:
             take(store, fields, store.segments.kept(segment.id))
         advice = look(store, fields, glider, state) if speaking is not None else ()
@@ -124,6 +128,9 @@ def take_log(
         store.note(file, now)
         if dialog is not None:
             store.calls.keep(file.path, dialog.call, plain_encode(dialog), now)
+            call = dialog.call
+            if call.glider:
+                store.health.put(call.glider, file.path, call.last_t, of_call(call))
         alerts = (
             _due_messages(store, file.glider, params, speaking, now) if file.status is Status.TAKEN else ()
         )
@@ -245,12 +252,13 @@ def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: 
 
 
 def _speak_of_calls(
-    said: NotificationState, known: GliderFacts, now: float
+    said: NotificationState, known: GliderFacts, acks: Acks, reminder_hours: float | None, now: float
 ) -> tuple[NotificationState, list[Notice]]:
     """What is to be said of what a glider told in its calls."""
     calls = known.calls(now - GONE)
-    episodes, notices = aborts.announce(known.glider, said.aborts, calls, now)
-    empty, more = without_files.announce(known.glider, said.empty, calls, known.signs(now - GONE), now)
+    episodes, notices = aborts.announce(known.glider, said.aborts, calls, now, acks, reminder_hours)
+    signs = known.signs(now - GONE)
+    empty, more = without_files.announce(known.glider, said.empty, calls, signs, now, acks)
     return replace(said, aborts=episodes, empty=empty), [*notices, *more]
 
 
@@ -275,10 +283,15 @@ def _compare(
 
 
 def _due_messages(
-    store: Store, glider: str, params: GliderParams, speaking: Routing | None, now: float
+    store: Store,
+    glider: str,
+    params: GliderParams,
+    speaking: Routing | None,
+    now: float,
 ) -> tuple[Alert, ...]:
     if speaking is None:
         return ()
+    store.health.judge(glider, speaking.limits(glider))
     attention = with_mute(speaking.attention(glider), store.notes.muted_until(glider))
     if attention.is_quiet(now):
         withdraw_answered(store, glider, now, quiet=True)
@@ -300,8 +313,13 @@ def _due_messages(
     ids, of_files = irregularities.due(before.irregularities, known.irregularities(now), now)
     said = replace(said, unknown=blind, irregularities=ids)
     said, of_fleet = _compare(store, said, last, params)
-    said, of_calls = _speak_of_calls(said, known, now)
-    alerts = tuple(map(render, (*heard, *of_files, *of_incidents, *of_watch, *of_fleet, *of_calls)))
+    acks, reminder_hours = store.notes.acks(glider), params.rules.reminder_hours
+    said, of_calls = _speak_of_calls(said, known, acks, reminder_hours, now)
+    rows, fix = store.health.judged(glider), known.last_fix(now - GONE)
+    threads, of_health = health.announce(said.health, glider, rows, fix, acks, reminder_hours)
+    said = replace(said, health=threads)
+    due = (*heard, *of_files, *of_incidents, *of_watch, *of_fleet, *of_calls, *of_health)
+    alerts = tuple(map(render, due))
     if said != before or alerts:
         post_alerts(store, glider, said, alerts, _channels(store, before.silences, speaking), now)
     return alerts

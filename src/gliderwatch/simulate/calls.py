@@ -15,9 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
+from gliderwatch.model import Array
+from gliderwatch.simulate.ailments import DAY, Ailment, AilmentKind, of_kind
 from gliderwatch.simulate.delivery import USUAL, Act, FileForm, Step, encoded, from_glider, make_calls
 from gliderwatch.simulate.scenario import DiveTruth, Mission
-from gliderwatch.simulate.telemetry import SegmentData
+from gliderwatch.simulate.telemetry import TIME, SegmentData
 
 SERVER_AHEAD = 15.0
 """Seconds by which the server's clock, which names the logs, is ahead of the glider's."""
@@ -31,6 +33,7 @@ class Fate(StrEnum):
 
     USUAL = "usual"
     ABORT = "abort"
+    LASTGASP = "lastgasp"
     GLIDER_DOS = "glider_dos"
     DROPPED = "dropped"
     NO_FILE = "no_file"
@@ -38,7 +41,8 @@ class Fate(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class CallRates:
-    """Parts of 1: of the calls ``dropped``, and without a file (``no_file``); of the lines ``garbled``.
+    """Parts of 1: of the calls ``dropped``, without a file (``no_file``), and in which a pilot types
+    (``typing``); of the lines ``garbled``.
 
     ``abort`` is the day of the mission from whose first call on an abort is told (None: never), by
     ``cause``. From then on the glider waits at its prompt.
@@ -49,6 +53,7 @@ class CallRates:
     garbled: float = 0.0
     abort: float | None = None
     cause: str = "LEAK"
+    typing: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,32 +75,63 @@ class CallLog:
         return self.fate in (Fate.USUAL, Fate.DROPPED)
 
 
-def call_logs(mission: Mission, rates: CallRates = CallRates(), form: FileForm = USUAL) -> Iterator[CallLog]:
+def call_logs(
+    mission: Mission,
+    rates: CallRates = CallRates(),
+    form: FileForm = USUAL,
+    ailments: tuple[Ailment, ...] = (),
+) -> Iterator[CallLog]:
     """The log of each call of a mission, in order of time."""
-    rng, scenario = mission.scenario.rng(7), mission.scenario
-    calls = make_calls(mission)
+    rng, typing, scenario = mission.scenario.rng(7), mission.scenario.rng(9), mission.scenario
+    calls, closing = make_calls(mission), _Closing(mission)
     told = False
     for t, sendings in zip(calls.times, calls.sendings, strict=True):
         chance = rng.random(4)
-        is_lost = rates.abort is not None and t >= scenario.start + rates.abort * 86400.0
-        fate = Fate.USUAL
+        is_lost = rates.abort is not None and t >= scenario.start + rates.abort * DAY
+        fate = _fate(rates, ailments, t, chance)
         if is_lost:
             fate, told = (Fate.GLIDER_DOS, told) if told else (Fate.ABORT, True)
-        elif chance[0] < rates.dropped:
-            fate = Fate.DROPPED
-        elif chance[1] < rates.no_file:
-            fate = Fate.NO_FILE
         files = [s.segment for s in sendings]
         lines = [
-            *_status(mission, t, fate),
-            *_aborted(rates, t, fate, is_lost),
+            *_status(mission, t, fate, closing.before(t)),
+            *_devices(scenario.start, t, ailments),
+            *_aborted(rates, fate, is_lost),
+            *(_TYPED if typing.random() < rates.typing else ()),
             *(_transfers(files, scenario.glider, form) if fate in (Fate.USUAL, Fate.DROPPED) else ()),
         ]
-        lines = lines[: int(_CUT * len(lines))] if fate is Fate.DROPPED else [*lines, *_end(fate)]
+        lines = lines[: int(_CUT * len(lines))] if fate is Fate.DROPPED else [*lines, *_end(fate, is_lost)]
         end = b"\r\n" if chance[2] < 0.5 else b"\n"
         yield CallLog(
             _name(scenario.glider, t, modem=chance[3] < 0.5), _written(lines, t, end, rates, rng), fate
         )
+
+
+def _fate(rates: CallRates, ailments: tuple[Ailment, ...], t: float, chance: Array) -> Fate:
+    """What becomes of a call at a time (s) of a glider that has not aborted."""
+    if of_kind(ailments, AilmentKind.GLIDER_DOS, t):
+        return Fate.GLIDER_DOS
+    if of_kind(ailments, AilmentKind.LASTGASP, t):
+        return Fate.LASTGASP
+    if chance[0] < rates.dropped:
+        return Fate.DROPPED
+    return Fate.NO_FILE if chance[1] < rates.no_file else Fate.USUAL
+
+
+_TYPED = ("^R", "^W", "!get u_alt_min_depth", "User typed Control-R, resuming")
+"""What a log has of a pilot who types."""
+
+
+class _Closing:
+    """The segments of a mission by when they were closed."""
+
+    def __init__(self, mission: Mission) -> None:
+        self._segments = sorted(mission.segments, key=lambda s: s.closed)
+        self._times = [s.closed for s in self._segments]
+
+    def before(self, t: float) -> SegmentData | None:
+        """The last one that was closed by a time (s)."""
+        k = bisect_right(self._times, t)
+        return self._segments[k - 1] if k else None
 
 
 def _name(glider: str, t: float, *, modem: bool) -> str:
@@ -104,18 +140,18 @@ def _name(glider: str, t: float, *, modem: bool) -> str:
     return f"{glider}_modem_{stamp}.log" if modem else f"{glider}_{stamp}_network_net_0.log"
 
 
-def _status(mission: Mission, t: float, fate: Fate) -> list[str]:
+def _status(mission: Mission, t: float, fate: Fate, segment: SegmentData | None) -> list[str]:
     glider, start = mission.scenario.glider, mission.scenario.start
     dive = next((d for d in reversed(mission.truth) if d.t_surface <= t), None)
     now = datetime.fromtimestamp(t, UTC)
     head = ["Connection Event: Carrier Detect found.    Iridium console active and ready..."]
-    segment = _segment(mission, dive)
     if fate is not Fate.GLIDER_DOS and segment is not None:
         header, short = segment.header, segment.header.short_name
+        name = "lastgasp.mi" if fate is Fate.LASTGASP else "sim.mi"
         head += [
             f"Glider {glider} at surface.",
             "Because:timeout expired [behavior surface_4 start_when = 2.0]",
-            f"MissionName:sim.mi MissionNum:{header.full_name} ({short[:4]}.{short[4:]})",
+            f"MissionName:{name} MissionNum:{header.full_name} ({short[:4]}.{short[4:]})",
         ]
     return [
         *head,
@@ -123,17 +159,50 @@ def _status(mission: Mission, t: float, fate: Fate) -> list[str]:
         f"Curr Time: {now:%a %b} {now.day:2d} {now:%H:%M:%S %Y} MT: {t - start:8.0f}",
         "GPS TooFar:   69696969.000 N 69696969.000 E measured     1e+308 secs ago",
         *([] if dive is None else [_fix(dive, t)]),
-        "   sensor:m_battery(volts)=15.0642643455672        59.765 secs ago",
-        "   sensor:m_leakdetect_voltage(volts)=2.49996947496948       27.792 secs ago",
-        "   sensor:m_vacuum(inHg)=8.05210989010989         123.786 secs ago",
-        "devices:(t/m/s) errs:   0/   0/   0 warn:  34/   6/   1 odd: 277/  72/   4",
+        *([] if segment is None else _sensors(segment, t)),
+        "Megabytes available on c: = 7763.84",
+        "report_heap_size(): M_FREE_HEAP=277.0K(283620 bytes)",
     ]
 
 
-def _segment(mission: Mission, dive: DiveTruth | None) -> SegmentData | None:
-    if dive is None:
-        return None
-    return next((s for s in mission.segments if s.header.full_name == dive.segment), None)
+_PRINTED = (
+    "m_battery",
+    "m_coulomb_amphr_total",
+    "m_digifin_leakdetect_reading",
+    "m_leakdetect_voltage",
+    "m_leakdetect_voltage_forward",
+    "m_lithium_battery_relative_charge",
+    "m_vacuum",
+)
+"""Sensors that a glider prints in a call, where its files have them too."""
+
+
+def _sensors(segment: SegmentData, t: float) -> list[str]:
+    """The last value of each sensor in the glider's last file, as it prints them."""
+    columns = segment.sensors.columns
+    times = segment.values[:, [sensor.name for sensor in columns].index(TIME)]
+    lines = []
+    for k, sensor in enumerate(columns):
+        at = np.flatnonzero(~np.isnan(segment.values[:, k]))
+        if sensor.name in _PRINTED and len(at) > 1:
+            value, age = segment.values[at[-1], k], max(t - times[at[-1]], 0.1)
+            lines.append(f"   sensor:{sensor.name}({sensor.unit})={value:.10g} {age:12.3f} secs ago")
+    return lines
+
+
+def _devices(start: float, t: float, ailments: tuple[Ailment, ...]) -> list[str]:
+    """The counts of all devices, and of the digifin alone; a reset has them begin anew."""
+    reset = of_kind(ailments, AilmentKind.RESET, t)
+    since = start if reset is None else reset.onset
+    found = of_kind(ailments, AilmentKind.DEVICE_ERROR, t)
+    errors = 0 if found is None or found.onset < since else int(found.size)
+    warned, odd = int((t - since) / DAY * 2), int((t - since) / DAY * 12)
+    counts = f"errs: {errors:3d}/{errors:3d}/{errors:3d} warn: {warned:3d}/{warned:3d}/  1"
+    return [
+        f"devices:(t/m/s) {counts} odd: {odd:3d}/ 72/   4",
+        f"14 digifin I u 3 20 5 0 [ {errors} {errors} {errors}] [ {warned} 5 1] [ {odd} 62 4]",
+        *([":OOD: digifin: OUT OF DEADBAND"] if errors else ()),
+    ]
 
 
 def _fix(dive: DiveTruth, t: float) -> str:
@@ -147,9 +216,10 @@ def _nmea(angle: float) -> str:
     return f"{copysign(degrees * 100 + rest / 1000, angle):9.3f}"
 
 
-def _aborted(rates: CallRates, t: float, fate: Fate, is_lost: bool) -> list[str]:
+def _aborted(rates: CallRates, fate: Fate, is_lost: bool) -> list[str]:
+    fell = ["Mission completed ABNORMALLY", "SEQUENCE: Running lastgasp.mi on try 0"]
     if not is_lost:
-        return ["ABORT HISTORY: total since reset: 0"]
+        return [*(fell if fate is Fate.LASTGASP else ()), "ABORT HISTORY: total since reset: 0"]
     history = [
         "ABORT HISTORY: total since reset: 1",
         f"ABORT HISTORY: last abort cause: MS_ABORT_{rates.cause}",
@@ -175,10 +245,11 @@ def _transfers(files: list[SegmentData], glider: str, form: FileForm) -> list[st
     return [*lines, "GLD: SUCCESS"]
 
 
-def _end(fate: Fate) -> list[str]:
+def _end(fate: Fate, is_lost: bool) -> list[str]:
     if fate in (Fate.ABORT, Fate.GLIDER_DOS):
-        return ["GliderDos A 24 >Connection Event: Carrier Detect lost."]
-    if fate is Fate.NO_FILE:
+        prompt = "A 24" if is_lost else "N -1"
+        return [f"GliderDos {prompt} >Connection Event: Carrier Detect lost."]
+    if fate in (Fate.NO_FILE, Fate.LASTGASP):
         return [
             "behavior surface_4: TIMED OUT WAITING FOR A CHARACTER",
             "Connection Event: Carrier Detect lost.",

@@ -211,6 +211,8 @@ def _log_power(glider: Glider, nodes: Cycles, motion: Motion) -> None:
     log.add("m_battery", nodes, 15.2 - 0.001 * hours + 0.01 * rng.standard_normal(n))
     leaked = 2.0 * (1 - glider.health.oil(glider.time(glider.cycle)))
     log.add("m_vacuum", nodes, 7.5 - leaked + 0.02 * rng.standard_normal(n))
+    log.add("m_veh_temp", nodes, 18.0)
+    log.add("m_digifin_leakdetect_reading", nodes, 1022.0)
     log.add("m_leakdetect_voltage", nodes, 2.49 + 0.001 * rng.standard_normal(n))
     for place in ("forward", "science"):
         log.add(f"m_leakdetect_voltage_{place}", nodes, 2.49 + 0.001 * luck.standard_normal(n))

@@ -19,6 +19,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from gliderwatch.errors import ConfigError, GliderwatchError
+from gliderwatch.simulate.ailments import Ailment, ailing, ailment
 from gliderwatch.simulate.calls import CallLog, CallRates, as_called, call_logs, log_steps
 from gliderwatch.simulate.delivery import (
     FileForm,
@@ -88,16 +89,25 @@ def _reported(dive: DiveTruth) -> tuple[float, float]:
 
 
 def write_truth(
-    folder: Path, missions: Sequence[Mission], logs: Mapping[str, Sequence[CallLog]] = MappingProxyType({})
+    folder: Path,
+    missions: Sequence[Mission],
+    logs: Mapping[str, Sequence[CallLog]] = MappingProxyType({}),
+    ailments: Sequence[Ailment] = (),
 ) -> tuple[Path, Path]:
     """Write `truth.nc`, one row a dive, and `truth.json`, the faults, artefacts and calls; their paths.
 
-    ``logs`` are those of the calls of each glider, where they are written.
+    ``logs`` are those of the calls of each glider, where they are written; the ``ailments`` are the last
+    glider's.
     """
     folder.mkdir(parents=True, exist_ok=True)
     table, facts = folder / "truth.nc", folder / "truth.json"
     _write_table(table, missions)
     gliders = [_facts(mission) | _calls(logs.get(mission.scenario.glider, ())) for mission in missions]
+    if gliders and ailments:
+        gliders[-1]["ailments"] = [
+            {"kind": a.kind, "onset": _iso(a.onset), "onset_seconds": a.onset, "size": a.size}
+            for a in ailments
+        ]
     text = json.dumps({"gliders": gliders}, indent=1)
     facts.write_text(text + "\n", encoding="utf-8")
     return table, facts
@@ -223,13 +233,14 @@ Logs = Mapping[str, Sequence[CallLog]]
 class Job:
     """Where to write the files of which gliders, whether compressed, and how much faster than time
     (None: at once). ``calls``: how the calls go whose logs are written (None: none are); it is the last
-    glider that aborts."""
+    glider that aborts, and has the ``ailments``."""
 
     out: Path
     scenarios: Sequence[Scenario]
     compressed: bool = False
     speedup: float | None = None
     calls: CallRates | None = None
+    ailments: tuple[Ailment, ...] = ()
 
     @property
     def dockserver(self) -> Path:
@@ -269,14 +280,21 @@ def call_rates(abort: str | None) -> CallRates:
     return replace(usual, abort=float(match[2]), cause=match[1].upper())
 
 
+def ailments(texts: Sequence[str], scenario: Scenario) -> tuple[Ailment, ...]:
+    """The ailments given in short, of a scenario. Raises `ConfigError` for one that is none."""
+    return tuple(ailment(text, scenario.start) for text in texts)
+
+
 def run(job: Job) -> None:
     """Do it, and say what was done. Raises `GliderwatchError` where a glider cannot fly."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     console, is_seen = Console(stderr=True), sys.stderr.isatty()
     with Progress(*columns, console=console, transient=True, disable=not is_seen) as progress:
         missions = _fly(job, progress)
+        if job.ailments:
+            missions[-1] = ailing(missions[-1], job.ailments)
         logs = _logs(job, missions)
-        table, facts = write_truth(job.out, missions, logs)
+        table, facts = write_truth(job.out, missions, logs, job.ailments)
         count = _write(job, missions, logs, progress)
     print(f"{count} files of {len(missions)} gliders below {job.dockserver}")
     print(f"what is true of them: {table}, {facts}")
@@ -300,7 +318,9 @@ def _logs(job: Job, missions: Sequence[Mission]) -> Logs:
     logs = {}
     for mission in missions:
         rates = job.calls if mission is missions[-1] else replace(job.calls, abort=None)
-        logs[mission.scenario.glider] = tuple(call_logs(mission, rates, _form(job, mission, Names.AS_SENT)))
+        ailing_ = job.ailments if mission is missions[-1] else ()
+        form = _form(job, mission, Names.AS_SENT)
+        logs[mission.scenario.glider] = tuple(call_logs(mission, rates, form, ailing_))
     return logs
 
 

@@ -45,6 +45,7 @@ SENSORS = _sensors("""
     m_de_oil_vol cc
     m_depth m
     m_depth_rate m/s
+    m_digifin_leakdetect_reading nodim
     m_dr_time s
     m_final_water_vx m/s
     m_final_water_vy m/s
@@ -70,6 +71,7 @@ SENSORS = _sensors("""
     m_thruster_power watt
     m_tot_num_inflections nodim
     m_vacuum inHg
+    m_veh_temp degC
     m_water_depth m
     m_water_vx m/s
     m_water_vy m/s

@@ -14,9 +14,12 @@ from typing import BinaryIO
 
 from gliderwatch.errors import Quarantine
 from gliderwatch.model import Aborts, Call, Fix, Happened, Happening
-from gliderwatch.slocum import folders, logs
+from gliderwatch.slocum import folders
+from gliderwatch.slocum import log_events as events
+from gliderwatch.slocum.call_readings import with_readings
 from gliderwatch.slocum.header import open_regular
-from gliderwatch.slocum.logs import LONGEST_LINE, Event, parse_line
+from gliderwatch.slocum.log_events import Event
+from gliderwatch.slocum.logs import LONGEST_LINE, parse_line
 
 LARGEST = 16_000_000
 """Bytes of a log that are read: the longest call of a glider makes some hundred kilobytes."""
@@ -110,11 +113,14 @@ def after(dialog: Dialog, event: Event) -> Dialog:
     """The dialog after one more event."""
     dialog = _happening(_aborts(dialog, event), event)
     match event:
-        case logs.Clock():
-            return _timed(dialog, event.t)
-        case logs.Vehicle():
+        case events.Clock():
+            timed = _timed(dialog, event.t)
+            return (
+                timed if timed is dialog else replace(timed, call=with_readings(timed.call, event, event.t))
+            )
+        case events.Vehicle():
             return _named(dialog, event.name)
-        case logs.PilotThere():
+        case events.PilotThere():
             return replace(dialog, by_pilot=dialog.by_pilot or event.ends)
     return replace(dialog, call=_told(dialog.call, event, dialog.t))
 
@@ -122,21 +128,22 @@ def after(dialog: Dialog, event: Event) -> Dialog:
 def _told(call: Call, event: Event, t: float) -> Call:
     """The call after an event at a time (s)."""
     match event:
-        case logs.Position():
+        case events.Position():
             call = replace(call, fix=Fix(t - event.age, event.lat, event.lon))
-        case logs.Carrier():
+        case events.Carrier():
             call = replace(call, over=not event.found)
-        case logs.HangUp():
+        case events.HangUp():
             call = replace(call, calls_back=call.calls_back or event.minutes is not None)
-        case logs.Mission():
-            call = replace(call, mission=event.name, mission_t=t, segment=event.segment)
-        case logs.Because():
+        case events.Mission():
+            short = event.short.replace(".", "")
+            call = replace(call, mission=event.name, mission_t=t, segment=event.segment, short=short)
+        case events.Because():
             call = replace(call, reason=event.reason)
-        case logs.Waypoint():
+        case events.Waypoint():
             call = replace(call, waypoint=(event.lat, event.lon))
-        case logs.Transfer():
+        case events.Transfer():
             call = _transferred(call, event)
-    return call
+    return with_readings(call, event, t) if t else call
 
 
 def _timed(dialog: Dialog, t: float) -> Dialog:
@@ -160,7 +167,7 @@ def _named(dialog: Dialog, name: str) -> Dialog:
     return replace(dialog, names=tuple(counts.items()), call=replace(dialog.call, glider=best))
 
 
-def _transferred(call: Call, event: logs.Transfer) -> Call:
+def _transferred(call: Call, event: events.Transfer) -> Call:
     announced, sent = call.announced, call.sent
     if event.file not in announced:
         announced = (*announced, event.file)[-_MOST:]
@@ -173,13 +180,13 @@ def _aborts(dialog: Dialog, event: Event) -> Dialog:
     """Put the abort history together, whose lines follow each other; it counts once it is whole."""
     pending = dialog.aborts
     match event:
-        case logs.AbortCount() if event.count > 0:
+        case events.AbortCount() if event.count > 0:
             return replace(_printed(dialog), aborts=Aborts(event.count, dialog.t))
-        case logs.AbortCount():
+        case events.AbortCount():
             return _printed(replace(_printed(dialog), aborts=Aborts(0, dialog.t)))
-        case logs.AbortCause() if pending is not None:
+        case events.AbortCause() if pending is not None:
             return replace(dialog, aborts=replace(pending, cause=event.cause))
-        case logs.AbortTime() if pending is not None:
+        case events.AbortTime() if pending is not None:
             return _printed(replace(dialog, aborts=replace(pending, t=event.t)))
     return dialog if pending is None else _printed(dialog)
 
@@ -197,19 +204,19 @@ def _printed(dialog: Dialog) -> Dialog:
 def _happening(dialog: Dialog, event: Event) -> Dialog:
     found: tuple[Happening, str] | None = None
     match event:
-        case logs.AbortNow():
+        case events.AbortNow():
             found = Happening.ABORTING, event.cause
-        case logs.FellOut():
+        case events.FellOut():
             found = Happening.FELL_OUT, ""
-        case logs.LastMission():
+        case events.LastMission():
             found = Happening.LAST_MISSION, event.name
-        case logs.Prompt():
+        case events.Prompt():
             found = Happening.GLIDER_DOS, f"{event.end} {event.code}"
-        case logs.Emergency():
+        case events.Emergency():
             found = Happening.EMERGENCY, ""
-        case logs.WeightDropped():
+        case events.WeightDropped():
             found = Happening.WEIGHT_DROPPED, ""
-        case logs.Reading(sensor="m_weight_drop", value=value) if value >= 0.5:
+        case events.Reading(sensor="m_weight_drop", value=value) if value >= 0.5:
             found = Happening.WEIGHT_DROPPED, ""
     call = dialog.call
     if found is None or any((h.what, h.cause) == found for h in call.happened):

@@ -125,7 +125,7 @@ __all__ = [
     "schema",
 ]
 
-SCHEMA = 9
+SCHEMA = 10
 DELIVERY_BY_WORDS = """CASE
     WHEN delivered_at IS NULL THEN 'pending' WHEN error = '' THEN 'delivered'
     WHEN error LIKE 'withdrawn: %' THEN 'withdrawn' WHEN error LIKE 'given up: %' THEN 'unreadable'
@@ -292,6 +292,17 @@ CREATE TABLE layers (             -- layers of the sea after each segment, and t
     data      TEXT NOT NULL,      -- `layers.advice.Layered`
     PRIMARY KEY (glider, opened_at, segment)
 ) STRICT;
+""",
+    10: """
+CREATE TABLE health (             -- readings of each segment and call, and what the rules found in them
+    source   TEXT PRIMARY KEY,    -- name of a segment, or path of a log
+    glider   TEXT NOT NULL,
+    t        REAL NOT NULL,       -- its last reading, by the glider's clock
+    readings TEXT NOT NULL,
+    judged   TEXT                 -- `health.rules.Judged`; NULL: it is to be judged
+) STRICT;
+CREATE INDEX health_in_order ON health (glider, t);
+CREATE INDEX health_to_judge ON health (glider, t) WHERE judged IS NULL;
 """,
 }
 """SQL that leads from the schema before to the one of the key. It may call the functions of

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterator
+from pathlib import Path
 
 from gliderwatch.incidents.acknowledgement import Ack, Acks
-from gliderwatch.incidents.constants import GONE
+from gliderwatch.incidents.calls import announced_flight
+from gliderwatch.incidents.constants import GONE, UNTIL_COME
 from gliderwatch.incidents.irregularities import PLACES, Coming, found
 from gliderwatch.incidents.notices import Irregularity, Unjudged
 from gliderwatch.incidents.overdue import Sign
@@ -231,8 +233,33 @@ class GliderFacts:
 
     def calls(self, since: float) -> tuple[Call, ...]:
         """Its calls that went on at `since` (s) or later, in order of time."""
+        if not self._db.execute("SELECT 1 FROM sqlite_schema WHERE name = 'calls'").fetchone():
+            return ()  # a state file of an earlier release, which may be looked at
         sql = "SELECT call FROM calls WHERE glider = ? AND last_t >= ? ORDER BY began, path"
         return tuple(values(self._db, sql, (self.glider, since), Call))
+
+    def last_fix(self, since: float) -> Fix | None:
+        """Its last fix, by the surfacings that its files tell, and the calls since a time (s)."""
+        fixes = [*self.places(1), *(call.fix for call in self.calls(since) if call.fix is not None)]
+        return max(fixes, key=lambda fix: fix.t, default=None)
+
+    def not_come(self, since: float, now: float) -> tuple[tuple[float, str], ...]:
+        """The flight files that it announced in a call that was over since (s), an hour ago at least, and of
+        which none came, under whatever name: when that call began (s), and their names in it."""
+        names = {
+            row[0].lower()
+            for row in self._db.execute("SELECT segment FROM heard WHERE glider = ?", (self.glider,))
+        }
+        sql = "SELECT path FROM files WHERE glider = ? AND status != 'unknown'"
+        names |= {Path(row[0]).name.lower() for row in self._db.execute(sql, (self.glider,))}
+        missing: dict[str, float] = {}
+        for call in self.calls(since):
+            if now - call.last_t < UNTIL_COME:
+                continue
+            for file in announced_flight(call):
+                if not names & {file.name, file.segment}:
+                    missing.setdefault(file.name, call.began)
+        return tuple((t, name) for name, t in missing.items())
 
 
 class Calls:

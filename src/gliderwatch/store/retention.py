@@ -140,6 +140,7 @@ def _results(db: sqlite3.Connection, transaction: Transaction, glider: str) -> I
         ("assessments", "glider = ? AND t_dive < ?", (glider, until)),
         ("heard", "glider = ? AND opened_at < ?", (glider, opened_at)),
         ("calls", "glider = ? AND last_t < ?", (glider, opened_at)),
+        ("health", "glider = ? AND t < ?", (glider, opened_at)),
         ("expected", "glider = ? AND after < ? AND opened_at < ?", (glider, opened_at, opened_at)),
         ("layers", "glider = ? AND opened_at < ?", (glider, opened_at)),
     ):

@@ -219,6 +219,11 @@ class Segments:
         row = self._held(identity)
         return codec.plain_decode(row["completeness"], tuple[int, int, str]) if row is not None else None
 
+    def offset(self, identity: SegmentId) -> float:
+        """What is to be added to the glider's clock (s) in a segment that is held."""
+        row = self._held(identity)
+        return 0.0 if row is None else float(row["clock_offset"])
+
     def is_held(self, glider: str, name: str) -> bool:
         """Whether any segment of this name is held."""
         sql = "SELECT EXISTS (SELECT 1 FROM segments WHERE glider = ? AND name = ?)"

@@ -23,6 +23,7 @@ from gliderwatch.store import codec, outbox, retention, segments
 from gliderwatch.store.codec import File, Status, Undelivered, file_of, values
 from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, read_only
 from gliderwatch.store.fields import Fields
+from gliderwatch.store.health import HealthRows
 from gliderwatch.store.layers import LayerRows
 from gliderwatch.store.results import Annotations, Calls, GliderFacts
 from gliderwatch.store.segments import RECENT, Segments
@@ -48,6 +49,7 @@ class Store:
         self._db, self._path = connection, path
         self.segments, self.notes = Segments(connection), Annotations(connection)
         self.calls, self.fields = Calls(connection), Fields(connection)
+        self.health = HealthRows(connection)
         self.layers = LayerRows(connection)
 
     @classmethod

@@ -8,6 +8,7 @@ import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
+from urllib.parse import parse_qs
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -20,9 +21,11 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from gliderwatch.config import Config
+from gliderwatch.delivery import links
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.export import maps
 from gliderwatch.figures.coast import world
+from gliderwatch.messages.formatting import clean
 from gliderwatch.pages import render
 from gliderwatch.pages.reading import read_fleet, read_glider
 from gliderwatch.pages.render import Frame
@@ -30,7 +33,7 @@ from gliderwatch.pages.view import GliderView, worst_first
 from gliderwatch.service.jsonl import assessment_line
 from gliderwatch.service.liveness import STALE, is_held, seconds_silent
 from gliderwatch.store.state_file import Store
-from gliderwatch.web import api, links
+from gliderwatch.web import api
 from gliderwatch.web.cache import PageCache, stamp_of
 
 Acknowledge = Callable[[str, str, float], str]
@@ -43,6 +46,8 @@ LOOK = 1.0
 SIGN = 15.0
 """Seconds between two signs of life of a stream of news: proxies close silent ones."""
 MOST = 10_000
+_FORM = 2000
+"""Bytes of a form that is read."""
 
 
 class Site:
@@ -184,13 +189,22 @@ async def acknowledge(request: Request) -> Response:
         seconds = site.config.web.link_hours * 3600.0
         incident, recipient = links.opened(site.key, request.path_params["token"], seconds)
         if request.method == "POST":
-            told = await run_in_threadpool(site.acknowledge, incident, recipient, frame.now)
+            who = await _who(request, recipient)
+            told = await run_in_threadpool(site.acknowledge, incident, who, frame.now)
             return _ack_page(frame, incident, recipient, told=told)
     except links.LinkError as error:
         return _ack_page(frame, "", "", told=str(error), status=403)
     except GliderwatchError as error:
         return _ack_page(frame, "", "", told=str(error), status=409)
     return _ack_page(frame, incident, recipient)
+
+
+async def _who(request: Request, recipient: str) -> str:
+    """Who takes it on: the name that was typed, beside the recipient of the link."""
+    length = int(request.headers.get("content-length", _FORM + 1))
+    typed = parse_qs((await request.body()).decode("utf-8", "replace")) if length <= _FORM else {}
+    name = clean(typed.get("by", [""])[0], 40)
+    return f"{name} ({recipient})" if name else recipient
 
 
 def _ack_page(frame: Frame, incident: str, recipient: str, *, told: str = "", status: int = 200) -> Response:

@@ -1,0 +1,206 @@
+"""Findings of the rules of health become incidents, by the table of all incidents; the notices due. Pure.
+
+What is so follows from the readings, whatever their order of arrival. Notices are the difference between that
+and what people have been notified of, as for all incidents.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from gliderwatch.health.constants import REMEMBERED
+from gliderwatch.health.rule import Finding
+from gliderwatch.health.rules import Judged
+from gliderwatch.incidents.acknowledgement import Acks, is_taken_on
+from gliderwatch.incidents.constants import HEALTH_CLEAR_AFTER, NEWS
+from gliderwatch.incidents.notices import (
+    Content,
+    HealthFound,
+    HealthIncident,
+    HealthOver,
+    HealthReminder,
+    Notice,
+)
+from gliderwatch.incidents.send_schedule import next_reminder
+from gliderwatch.incidents.state_machine import TRANSITIONS, Event, Phase
+from gliderwatch.model import Fix, Kind, Severity
+
+
+def health_incidents(glider: str, rows: Iterable[tuple[float, Judged]]) -> tuple[HealthIncident, ...]:
+    """The incidents of a glider by what the rules found in its segments and calls, in order of time (s)."""
+    done: list[HealthIncident] = []
+    open_: dict[str, HealthIncident] = {}
+    normal: dict[str, int] = {}
+    for t, judged in rows:
+        for rule, finding in judged.items():
+            before = open_.get(rule)
+            phase = Phase.OK if before is None else Phase.OPEN
+            normal[rule] = 0 if finding is not None else normal.get(rule, 0) + 1
+            after = TRANSITIONS[phase, _event(phase, finding, normal[rule])]
+            if finding is not None:
+                open_[rule] = _opened(glider, t, finding) if before is None else _worse(before, finding)
+            elif before is not None and after is Phase.OK:
+                done.append(replace(open_.pop(rule), cleared_at=t))
+    return tuple(sorted((*done, *open_.values()), key=lambda i: (i.opened_at, i.id)))
+
+
+def _event(phase: Phase, finding: Finding | None, normal: int) -> Event:
+    """What a segment or call means for a rule: each rule has two readings in a row in it already."""
+    if finding is not None:
+        return Event.CONFIRMED if phase is Phase.OK else Event.FLAGGED
+    return Event.CLEARED if phase is Phase.OPEN and normal >= HEALTH_CLEAR_AFTER else Event.NORMAL
+
+
+def _opened(glider: str, t: float, finding: Finding) -> HealthIncident:
+    identity = f"{glider}/health/{finding.rule}/{finding.t:.0f}"
+    return HealthIncident(
+        identity, glider, finding.rule, finding.severity, finding.t, t, None, finding, finding
+    )
+
+
+def _worse(before: HealthIncident, finding: Finding) -> HealthIncident:
+    worst = finding if finding.severity > before.severity else before.worst
+    return replace(before, severity=worst.severity, worst=worst, last=finding)
+
+
+# ----------------------------------------
+# What people were notified of, compared with what is so.
+
+
+@dataclass(frozen=True, slots=True)
+class HealthThread:
+    """The notices of one incident: it as ``reported``, so many ``messages``, and the time (s) of the latest
+    reading known at the last; ``is_over`` once that was reported too."""
+
+    id: str
+    reported: HealthIncident
+    messages: int
+    time: float
+    is_over: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Now:
+    """What decides on the notices that are due: the ``latest`` reading (s), the last fix, acks."""
+
+    latest: float
+    fix: Fix | None
+    acks: Acks
+    reminder_hours: float | None
+
+
+def announce(
+    before: tuple[HealthThread, ...],
+    glider: str,
+    rows: Sequence[tuple[float, Judged]],
+    fix: Fix | None,
+    acks: Acks,
+    reminder_hours: float | None,
+) -> tuple[tuple[HealthThread, ...], list[Notice]]:
+    """What people have been notified of after the notices that are due, and these.
+
+    `rows` is what the rules found in the segments and calls known, in order of time (s); `fix` the glider's
+    last. Of what somebody has taken on (`acks`) nobody is reminded, unless it has grown worse.
+    """
+    if not rows:
+        return before, []
+    now = _Now(rows[-1][0], fix, acks, reminder_hours)
+    incidents = health_incidents(glider, rows)
+    matched = _matched(before, incidents)
+    threads, notices = list[HealthThread](), list[Notice]()
+    for thread in before:
+        after, more = _continued(thread, matched.get(thread.id), now)
+        threads.append(after)
+        notices += more
+    old, taken = {i.id for i in matched.values()}, {t.id for t in threads}
+    for incident in incidents:
+        is_news = incident.cleared_at is None or now.latest - incident.cleared_at < NEWS
+        if incident.id not in old and is_news:
+            identity = incident.id + "+" * sum(t.rstrip("+") == incident.id for t in taken)
+            taken.add(identity)
+            thread = HealthThread(identity, incident, 0, now.latest)
+            thread, more = _notified(thread, incident, HealthFound(incident, False, fix), now)
+            notices += more
+            if incident.cleared_at is not None:
+                thread, more = _continued(thread, incident, now)
+                notices += more
+            threads.append(thread)
+    return tuple(t for t in threads if not _is_past(t, now.latest)), notices
+
+
+def _is_past(thread: HealthThread, latest: float) -> bool:
+    """Whether a thread has been over for so long (s) that its incident is no news, whatever data come."""
+    return thread.is_over and latest - thread.time > REMEMBERED
+
+
+def _matched(
+    threads: Iterable[HealthThread], incidents: tuple[HealthIncident, ...]
+) -> dict[str, HealthIncident]:
+    """For each thread the incident it is about: the one reported, else one of its rule and time."""
+    by_id = {i.id: i for i in incidents}
+    out = {t.id: by_id[t.reported.id] for t in threads if t.reported.id in by_id}
+    free = [i for i in incidents if i not in out.values()]
+    for thread in threads:
+        near = [i for i in free if thread.id not in out and _overlaps(i, thread.reported)]
+        if near:
+            out[thread.id] = near[0]
+            free.remove(near[0])
+    return out
+
+
+def _overlaps(now: HealthIncident, reported: HealthIncident) -> bool:
+    until = max(reported.last.t, reported.opened_at)
+    until = until if reported.cleared_at is None else reported.cleared_at
+    return (
+        now.rule == reported.rule
+        and now.since <= until
+        and (now.cleared_at is None or reported.since <= now.cleared_at)
+    )
+
+
+def _continued(
+    thread: HealthThread, incident: HealthIncident | None, now: _Now
+) -> tuple[HealthThread, list[Notice]]:
+    """A thread after what is known now, and the notice that is due."""
+    if incident is None or incident.cleared_at is not None:
+        if thread.is_over:
+            return thread, []
+        ended = incident or thread.reported
+        content = HealthOver(ended, is_withdrawn=incident is None, fix=now.fix)
+        thread, notices = _notified(thread, ended, content, now)
+        return replace(thread, is_over=True), notices
+    if thread.is_over or incident.severity > thread.reported.severity:
+        thread, notices = _notified(thread, incident, HealthFound(incident, not thread.is_over, now.fix), now)
+        return replace(thread, is_over=False), notices
+    hours = now.reminder_hours
+    if hours is not None and not is_taken_on(now.acks, (incident.id, thread.id), incident.severity):
+        before, age = ((t - incident.opened_at) / 3600 / hours for t in (thread.time, now.latest))
+        if age >= next_reminder(before):
+            reminder = HealthReminder(incident, (now.latest - incident.since) / 3600, now.fix)
+            return _notified(thread, incident, reminder, now)
+    return replace(thread, reported=incident), []
+
+
+def _notified(
+    thread: HealthThread, incident: HealthIncident, content: Content, now: _Now
+) -> tuple[HealthThread, list[Notice]]:
+    """The thread after one more notice, and the notice."""
+    kind, severity = Kind.HEALTH, incident.severity
+    if isinstance(content, HealthOver):
+        kind, severity = Kind.ALL_CLEAR, Severity.INFO
+    elif isinstance(content, HealthReminder):
+        kind = Kind.REMINDER
+    worst = max(incident.severity, thread.reported.severity)
+    notice = Notice(
+        f"{thread.id}/{thread.messages}",
+        thread.id,
+        incident.glider,
+        now.latest,
+        kind,
+        severity,
+        worst,
+        content,
+    )
+    told = HealthThread(thread.id, incident, thread.messages + 1, now.latest, thread.is_over)
+    return told, [notice]

@@ -1,0 +1,92 @@
+"""The heuristics of the sea, each with its unit, what it is for, and where it comes from. Pure.
+
+`python benchmarks/seas.py` and `python benchmarks/currents.py` score a change of them. Where no source is
+named the value is a judgement, and the tests named by `benchmarks/mutations.py` pin what it is for.
+"""
+
+from __future__ import annotations
+
+# The flow at a glider
+LASTING_SIZE = 0.3
+"""m/s, a component: usual size of the part of the flow that lasts."""
+LASTING_MEMORY = 18 * 86400.0
+"""s: its memory."""
+PASSING = 0.08
+"""m/s, a component: usual size of the part that passes."""
+PASSING_MEMORY = 30 * 3600.0
+"""s: its memory."""
+INERTIAL = 0.06
+"""m/s, a component: usual size of inertial motion."""
+INERTIAL_MEMORY = 3 * 86400.0
+"""s: its memory."""
+TIDE_M2 = 0.25
+"""m/s, a component: prior size of each rotary part of M2, from nothing to the 1 m/s of shelf seas,"""
+TIDE_S2 = 0.12
+"""m/s: of S2 (0.46 of M2 in the equilibrium tide),"""
+TIDE_N2 = 0.06
+"""m/s: of N2 (0.2 of M2),"""
+TIDE_K1 = 0.15
+"""m/s: of K1,"""
+TIDE_O1 = 0.12
+"""m/s: of O1 (0.7 of K1)."""
+TIDE_WANDER = 0.08
+"""Part of a tidal part that changes in a day along the way,"""
+TIDE_LEAST = 0.005
+"""m/s: of at least this much."""
+CURRENT_SCALE = 60e3
+"""m over which currents differ by their own size."""
+
+# The forecast of the reference flow
+FIT_MEMORY = 100
+"""Dives after which what a filter of the bank foretold counts for a third, and what a forecast scored:
+seas change along the way."""
+TAIL = 6.0
+"""Degrees of freedom of Student's t by which innovations are judged: one wild dive must not decide."""
+SCALE_MEMORY = 40
+"""Dives over which the scale is learnt,"""
+SCALE_FEW = 6
+"""and how many its first guess counts for."""
+FAR = 9.0
+"""An innovation's normalised square counts as this at most."""
+SCALES = (0.1, 9.0)
+"""Bounds of the scale,"""
+FIRST_SCALE = 1.5
+"""and its first guess: little is known at first, and forecasts should say so."""
+PLAIN_STEPS = (0.015, 0.04, 0.12)
+"""m/s: usual changes of the residual in 3 h that are tried without tides,"""
+PLAIN_MEMORIES = (36e3, 108e3, 360e3, 3600e3)
+"""s: and its memories: 10, 30, 100 and 1000 h."""
+TIDAL_STEPS = (0.02, 0.08)
+"""m/s: usual changes of the residual that are tried with tides,"""
+TIDAL_MEMORIES = (108e3, 1080e3)
+"""s: and its memories: 30 and 300 h."""
+TIDAL_AMPLITUDES = (0.05, 0.2)
+"""m/s: usual amplitudes of M2 and K1 that are tried,"""
+TIDAL_CHANGE = 0.1
+"""and the part of them that changes in a day."""
+APART = 3 * 86400.0
+"""s without a current after which the sea is taken for unknown."""
+ENOUGH = 6.0
+"""Dives that a score needs before it decides."""
+MARGIN = 2.0
+"""Standard errors by which tides have to be better than persistence."""
+INTERVALS_KEPT = 8
+"""Dives whose intervals say how often the glider surfaces."""
+EVEN = 0.1
+"""Intervals that differ by more than this part are uneven: then no tide hides behind them."""
+NEAR = 0.05
+"""Half periods by which an interval may miss a whole number of them and still show one quadrature only."""
+OFTEN = 0.42
+"""Periods between surfacings at which a tide is well seen: clearly less than half a period."""
+FAINT = 0.2
+"""Part of a tide that is left in the mean over a dive, below which it is lost in the noise."""
+
+# The field of an ocean model or a radar
+STALE = 24 * 3600.0
+"""s beyond the last time of a field, or between two times of it, after which it is not believed."""
+WET = 0.5
+"""Part of a place's weight that must be water: nearer to land the field is not believed."""
+POINTS = 8
+"""Places along the way of a dive at which a field is read."""
+FASTEST_CURRENT = 10.0
+"""m/s: no current is faster; above it a value is a fill value that the file does not call one."""

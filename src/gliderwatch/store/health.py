@@ -1,0 +1,94 @@
+"""The readings of health in a state file, one row a segment or call, and what the rules found in each."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import accumulate, pairwise
+from types import MappingProxyType
+
+import numpy as np
+
+from gliderwatch.health.constants import REMEMBERED, REPORTED
+from gliderwatch.health.readings import History, Readings, recent
+from gliderwatch.health.rule import Finding, Limits
+from gliderwatch.health.rules import Judged, judge
+from gliderwatch.model import Array, Series, readonly
+from gliderwatch.store import codec
+
+_HELD = 4096
+"""Rows whose readings are held in memory, by their text: those of a month of fifteen gliders, some 25 MB."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """Readings as they are kept: names and lengths of the series; all times, then all values."""
+
+    names: tuple[str, ...]
+    counts: tuple[int, ...]
+    values: Array
+
+
+class HealthRows:
+    """The readings and findings of each glider, on the connection of its store."""
+
+    def __init__(self, connection: sqlite3.Connection) -> None:
+        self._db = connection
+
+    def put(self, glider: str, source: str, t: float, readings: Readings) -> None:
+        """Keep the readings of a segment or call, the last of them at ``t`` (s), in place of those that its
+        ``source`` had before; it and all that follow are to be judged (again)."""
+        row = self._db.execute("SELECT t FROM health WHERE source = ?", (source,)).fetchone()
+        since = t if row is None else min(t, row[0])
+        self._db.execute(
+            "INSERT OR REPLACE INTO health VALUES (?, ?, ?, ?, NULL)",
+            (source, glider, t, codec.plain_encode(_packed(readings))),
+        )
+        self._db.execute("UPDATE health SET judged = NULL WHERE glider = ? AND t >= ?", (glider, since))
+
+    def judge(self, glider: str, limits: Mapping[str, Limits]) -> None:
+        """Judge by ``limits`` what is to be judged: once for all files that came together."""
+        if not limits:
+            return
+        sql = "SELECT min(t) FROM health WHERE glider = ? AND judged IS NULL"
+        since: float | None = self._db.execute(sql, (glider,)).fetchone()[0]
+        if since is None:
+            return
+        sql = "SELECT t, source, readings FROM health WHERE glider = ? AND t >= ? ORDER BY t, source"
+        rows = self._db.execute(sql, (glider, since - REMEMBERED)).fetchall()
+        known = [(t, _unpacked(data)) for t, _, data in rows]
+        for k, (t, source, _) in enumerate(rows):
+            if t >= since:
+                judged = judge(History(recent(known[: k + 1]), known[k][1]), limits)
+                found = (codec.plain_encode(judged), source)
+                self._db.execute("UPDATE health SET judged = ? WHERE source = ?", found)
+
+    def judged(self, glider: str) -> tuple[tuple[float, Judged], ...]:
+        """What the rules found in each segment and call of the last weeks, in order of time (s)."""
+        if not self._db.execute("SELECT 1 FROM sqlite_schema WHERE name = 'health'").fetchone():
+            return ()  # a state file of an earlier release, which may be looked at
+        sql = (
+            "SELECT t, judged FROM health WHERE glider = ?1 "
+            "AND t >= (SELECT max(t) FROM health WHERE glider = ?1) - ?2 AND judged IS NOT NULL "
+            "ORDER BY t, source"
+        )
+        rows = self._db.execute(sql, (glider, REPORTED))
+        return tuple((t, codec.plain_decode(data, dict[str, Finding | None])) for t, data in rows)
+
+
+def _packed(readings: Readings) -> _Row:
+    parts = [s.t for s in readings.values()] + [s.v for s in readings.values()]
+    counts = tuple(len(s) for s in readings.values())
+    return _Row(tuple(readings), counts, readonly(np.concatenate(parts) if parts else []))
+
+
+@lru_cache(_HELD)
+def _unpacked(text: str) -> Readings:
+    row = codec.plain_decode(text, _Row)
+    times, values = row.values.reshape(2, -1)
+    slices = [slice(i, j) for i, j in pairwise([0, *accumulate(row.counts)])]
+    return MappingProxyType(
+        {name: Series(times[at], values[at]) for name, at in zip(row.names, slices, strict=True)}
+    )

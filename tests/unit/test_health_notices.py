@@ -1,0 +1,120 @@
+"""What rules of health find becomes incidents and notices: once each, worse, reminded of, over."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+
+from gliderwatch.health.rule import Finding
+from gliderwatch.health.rules import RULES
+from gliderwatch.incidents.acknowledgement import acknowledge_thread
+from gliderwatch.incidents.health import HealthThread, announce, health_incidents
+from gliderwatch.incidents.notices import HealthFound, HealthOver, HealthReminder, Notice
+from gliderwatch.messages.health_text import blocks
+from gliderwatch.messages.notice_text import render
+from gliderwatch.model import Fix, Kind, Severity
+
+T0, HOUR = 1.7e9, 3600.0
+Row = tuple[float, dict[str, Finding | None]]
+
+
+def finding(t: float, severity: Severity = Severity.WARNING, rule: str = "vacuum") -> Finding:
+    last = tuple((t - HOUR * k, 27000.0 - 100 * k) for k in range(10, 0, -1))
+    return Finding(
+        rule, severity, t - HOUR, "vacuum 5.90 inHg, twice in a row below 6.00 inHg", "vacuum", last
+    )
+
+
+def rows(*found: Severity | None, start: float = T0, step: float = 3 * HOUR) -> list[Row]:
+    times = [start + step * k for k in range(len(found))]
+    return [(t, {"vacuum": None if s is None else finding(t, s)}) for t, s in zip(times, found, strict=True)]
+
+
+def notices(all_rows: list[Row], **ack: Severity) -> list[Notice]:
+    """The notices as the rows come one after another."""
+    threads: tuple[HealthThread, ...] = ()
+    out, acks = [], {}
+    for n in range(1, len(all_rows) + 1):
+        threads, due = announce(threads, "a", all_rows[:n], Fix(T0, 1.0, 2.0), acks, 24.0)
+        out += due
+        if threads and "severity" in ack:
+            identity = threads[0].id
+            acks = {identity: acknowledge_thread(identity, ack["severity"], "ann", "", T0)}
+    return out
+
+
+W, C = Severity.WARNING, Severity.CRITICAL
+
+
+def test_found_once_worse_once_and_over_after_four_normal_ones() -> None:
+    found = notices(rows(None, W, W, W, C, C, None, None, None, W, None, None, None, None, None))
+    assert [type(n.content) for n in found] == [HealthFound, HealthFound, HealthOver]
+    first, worse, over = found
+    assert (first.kind, first.severity, worse.severity) == (Kind.HEALTH, W, C)
+    assert (over.kind, over.audience) == (Kind.ALL_CLEAR, C)
+    assert len({n.thread for n in found}) == 1 and len({n.id for n in found}) == 3
+    assert first.thread == f"a/health/vacuum/{T0 + 2 * HOUR:.0f}"
+
+
+def test_reminders_until_somebody_takes_it_on() -> None:
+    long = rows(*[W] * 60)  # a week
+    assert [type(n.content) for n in notices(long)] == [HealthFound] + [HealthReminder] * 4
+    assert [type(n.content) for n in notices(long, severity=W)] == [HealthFound]
+    worse = rows(*[W] * 20, *[C] * 20)
+    kinds = [type(n.content) for n in notices(worse, severity=W)]
+    assert kinds[:2] == [HealthFound, HealthFound] and HealthReminder in kinds
+
+
+def test_comes_again_in_a_thread_of_its_own() -> None:
+    again = rows(W, *[None] * 4, W, None)
+    found = notices(again)
+    assert [type(n.content) for n in found] == [HealthFound, HealthOver, HealthFound]
+    assert found[0].thread != found[2].thread
+
+
+def test_row_in_which_a_rule_has_nothing_to_look_at_says_nothing() -> None:
+    silent: list[Row] = [(T0 + 10 * HOUR * k, {}) for k in range(1, 9)]
+    (one,) = health_incidents("a", [*rows(W), *silent])
+    assert one.cleared_at is None
+
+
+def test_late_data_that_take_the_finding_back_withdraw_it() -> None:
+    threads, (found,) = announce((), "a", rows(None, W), None, {}, None)
+    threads, (over,) = announce(threads, "a", rows(None, None), None, {}, None)
+    assert isinstance(over.content, HealthOver) and over.content.is_withdrawn
+    assert over.thread == found.thread
+    assert announce(threads, "a", rows(None, None, None), None, {}, None)[1] == []
+
+
+def test_late_data_that_move_its_beginning_keep_the_thread() -> None:
+    threads, (found,) = announce((), "a", rows(None, W, W), None, {}, None)
+    threads, none = announce(threads, "a", rows(W, W, W), None, {}, None)
+    assert none == [] and [t.id for t in threads] == [found.thread]
+
+
+def test_what_was_over_long_before_it_was_known_is_no_news() -> None:
+    old = rows(W, *[None] * 20)
+    assert announce((), "a", old, None, {}, None) == ((), [])
+
+
+def test_message_says_what_the_rule_and_the_last_ten_values() -> None:
+    (notice,) = notices(rows(C))
+    alert = render(notice)
+    assert alert.title == "a VACUUM: vacuum 5.90 inHg"
+    assert "Last values: ▁▂▃▃▄▅▆▆▇█ vacuum 7.68 inHg to 7.94 inHg, 2023-11-14 12:13 UTC" in alert.body
+    assert "`health.vacuum`" in alert.body and "01° 00.000' N" in alert.body
+    for each in notices(rows(*[W] * 20, *[None] * 5)):
+        assert render(each).title.startswith(("a VACUUM", "a STILL VACUUM", "a ALL CLEAR: vacuum"))
+
+
+@pytest.mark.parametrize("rule", [rule.name for rule in RULES])
+def test_every_rule_has_words(rule: str) -> None:
+    (_, notice), *_ = [announce((), "a", [(T0, {rule: finding(T0, C, rule)})], None, {}, None)]
+    (alert,) = map(render, notice)
+    assert rule.replace("_", " ").upper() in alert.title
+
+
+def test_blocks_rise_with_values() -> None:
+    assert blocks([1.0, 2.0, 3.0]) == "▁▅█"
+    assert all(a <= b for a, b in itertools.pairwise(blocks([float(v) for v in range(10)])))

@@ -1,0 +1,439 @@
+"""The heuristics of speed and flow do what their page says: each case lies just on one side of a bound."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gliderwatch.estimation import kalman, modes
+from gliderwatch.estimation.dive_measurement import (
+    OWN,
+    SIDE,
+    SLIP,
+    Slipping,
+    are_apart,
+    drag_slip,
+    observe,
+    slip_at,
+    slip_of,
+)
+from gliderwatch.estimation.glider import speed_params
+from gliderwatch.estimation.healthy_baseline import Baseline, compare
+from gliderwatch.estimation.healthy_baseline import learn as learn_baseline
+from gliderwatch.estimation.kalman import JointParams, learn_measurement_scale, learn_process_scale
+from gliderwatch.estimation.kinematic_speed import Ratios, kinematic_speed, vertical
+from gliderwatch.estimation.modes import MODES, Cause, switched
+from gliderwatch.estimation.speed_range import Normal, RangeParams, SpeedRange, speed_range
+from gliderwatch.estimation.step_test import ratio_bound
+from gliderwatch.estimation.unassessed import of_model
+from gliderwatch.estimation.verdict import (
+    Blame,
+    Misfit,
+    SpeedParams,
+    SpeedState,
+    blame,
+    retrimmed,
+    step,
+)
+from gliderwatch.model import Dive, DiveFeatures, Fix, Flag, readonly
+from gliderwatch.params import GliderParams
+from gliderwatch.sea.ocean_field import Field
+from joint_support import HOUR, Way, dive, mission
+
+EAST = dive(0, Way(heading=0.0, speed=0.25))
+CIRCLE = dive(0, Way(heading=tuple(np.linspace(0, 2 * math.pi, 24, endpoint=False))))
+
+
+def heading_sigmas(of: Dive) -> list[float]:
+    """Standard errors of the mean heading vector, the smaller one first."""
+    return np.sqrt(np.linalg.eigvalsh(observe(of).heading_cov)).tolist()
+
+
+def known_by(of: Dive, **features: object) -> Dive:
+    return replace(of, features=replace(of.features, **features))
+
+
+class TestMeasurement:
+    def test_a_fix_is_5_m_off(self):
+        """Two fixes over 12 min: 7 m of 720 s; and the difference of two such ways in the current."""
+        seen = observe(dive(0, Way(), hours=0.2))
+        assert math.sqrt(seen.ground_cov[0, 0]) == pytest.approx(math.sqrt(2) * 5.0 / 720)
+        assert seen.current_sigma == pytest.approx(math.hypot(0.006, 10.0 / 720))
+
+    def test_a_provisional_current_is_2_cm_s_off(self):
+        assert observe(EAST).current_sigma == pytest.approx(0.006, rel=0.02)
+        provisional = replace(EAST, current=replace(EAST.current, final=False))
+        assert observe(provisional).current_sigma == pytest.approx(0.02, rel=0.02)
+
+    def test_the_drift_at_the_surface_is_another_flow(self):
+        vectors = EAST.track.heading.copy()
+        vectors[12:] = 0.0
+        seen = observe(replace(EAST, track=replace(EAST.track, heading=readonly(vectors))))
+        assert math.sqrt(seen.ground_cov[0, 0]) == pytest.approx(0.5 * 0.15, rel=0.01)
+
+    def test_swing_and_compass_of_a_straight_dive(self):
+        """24 samples, each 0.1 rad off its course: 0.006 of the length; the compass turns all by 0.02."""
+        along, aside = heading_sigmas(EAST)
+        assert along == pytest.approx(math.sqrt(2 / 24) * 0.1 / math.sqrt(24), rel=0.01)
+        assert aside == pytest.approx(math.hypot(along, 0.02), rel=0.01)
+
+    def test_dives_and_climbs_differ_by_a_twentieth(self):
+        """It matters where they head elsewhere: here east and north in turn, so that swings are equal."""
+        there = observe(dive(0, Way(heading=(0.0, math.pi / 2)), samples=960)).heading_cov
+        part = 0.05**2 * (1 - 0.5) / 2
+        aside = np.array([-1.0, 1.0]) / math.sqrt(2)
+        assert aside @ there @ aside == pytest.approx(part + 0.02**2 / 2, rel=0.1)
+
+    def test_hours_without_data_may_have_been_half_a_turn(self):
+        """A fifth of the dive: its mean vector is known to 0.5 of it."""
+        holed = known_by(EAST, unobserved=0.6 * HOUR)
+        assert heading_sigmas(holed)[0] == pytest.approx(0.1, rel=0.01)
+
+    @pytest.mark.parametrize(
+        ("known", "along", "length"),
+        [
+            ({"heading_reckoned": True}, 0.03, 1.0),
+            ({"heading_commanded": 3 * HOUR}, 0.1, 1.0),
+            ({"heading_assumed": True}, 0.2, 0.92),
+        ],
+    )
+    def test_a_length_that_no_compass_measured(self, known, along, length):
+        seen = known_by(EAST, **known)
+        assert heading_sigmas(seen)[1] == pytest.approx(math.hypot(along, 0.02), rel=0.01)
+        assert observe(seen).steadiness == pytest.approx(length)
+
+    @pytest.mark.parametrize(
+        ("known", "error"), [({"heading_reckoned": True}, 0.3), ({"heading_commanded": 3 * HOUR}, 0.08)]
+    )
+    def test_a_course_that_no_current_corrects(self, known, error):
+        assert heading_sigmas(replace(known_by(EAST, **known), current=None))[0] == pytest.approx(
+            error, rel=0.02
+        )
+
+    @pytest.mark.parametrize(("apart", "error"), [(0.8, 0.1), (1.1, 0.5)])
+    def test_few_commanded_headings_that_differ_tell_of_turns(self, apart, error):
+        """Mean of two headings 0.8 rad apart: 0.92 long, straight; of 1.1 rad: 0.85, it turned."""
+        turned = known_by(dive(0, Way(heading=(0.0, apart))), heading_commanded=3 * HOUR)
+        assert heading_sigmas(turned)[1] == pytest.approx(error, rel=0.05)
+
+    def test_slip_is_that_of_the_flight_model(self):
+        """Merckelbach et al. (2019): C_D0 0.15, a 7.5 1/rad; between 17 and 57 degrees of pitch."""
+        assert slip_at(0.45) == pytest.approx(0.15 / 7.5 / math.sin(0.45) ** 2)
+        assert slip_at(0.2) == slip_at(0.3) > slip_at(0.31)
+        assert slip_at(1.2) == slip_at(1.0) < slip_at(0.99)
+        assert observe(known_by(EAST, pitch_dive=None, pitch_climb=None)).slip == slip_at(0.45)
+
+    @pytest.mark.parametrize(("gap", "unseen"), [(9, 0), (11, 1)])
+    def test_a_gap_between_headings_is_longer_than_10_min(self, gap, unseen):
+        """Headings come every minute but once."""
+        assert (observe(_with_gap(60.0, 60.0 * gap)).unseen > 0) == bool(unseen)
+
+    @pytest.mark.parametrize(("cadences", "unseen"), [(2.4, 0), (2.6, 1)])
+    def test_a_gap_is_longer_than_2_5_spacings(self, cadences, unseen):
+        assert (observe(_with_gap(900.0, 900.0 * cadences)).unseen > 0) == bool(unseen)
+
+    def test_half_the_speed_by_drag_takes_a_quarter_of_90_percent(self):
+        assert drag_slip(np.array([0.125]), 0.25) == pytest.approx(0.225)
+
+    @pytest.mark.parametrize(("own", "counts"), [(0.001, 0.02), (5.0, 1.3), (0.3, 0.3)])
+    def test_a_speed_counts_as_what_a_glider_can_fly(self, own, counts):
+        states = np.array([[0.0, 0.0, own, 0.0, 0.0], [0.0, 0.0, counts, 0.0, 0.0]])
+        both, _ = slip_of(states, Slipping(0.1, 0.01, 2.0))
+        assert both[0] == both[1]
+        between, _ = slip_of(states * 1.2 + [[0, 0, 1e-9, 0, 0]], Slipping(0.1, 0.01, 2.0))
+        assert own != counts or between[0] != both[0]
+
+
+def _with_gap(spacing: float, gap: float) -> Dive:
+    """A dive of 40 headings that has one gap (s)."""
+    dt = np.full(40, spacing)
+    dt[20] = gap
+    t = EAST.t_dive + np.concatenate([[0.0], np.cumsum(dt)])
+    x = np.column_stack([0.25 * (t - t[0]), np.zeros(41)])
+    track = replace(EAST.track, t=readonly(t), x=readonly(x), heading=readonly(np.tile([1.0, 0.0], (40, 1))))
+    return replace(EAST, track=track, t_surface=float(t[-1]))
+
+
+class TestDeployments:
+    @pytest.mark.parametrize(("days", "apart"), [(2.9, False), (3.1, True)])
+    def test_after_three_days_it_is_another_one(self, days, apart):
+        assert are_apart(Fix(0.0, 30.0, -80.0), Fix(days * 86400.0, 30.0, -80.0)) == apart
+
+    @pytest.mark.parametrize(("speed", "apart"), [(2.9, False), (3.1, True)])
+    def test_nothing_drifts_at_3_m_s(self, speed, apart):
+        north = speed * 36000.0 / 111.2e3
+        assert are_apart(Fix(0.0, 30.0, -80.0), Fix(36000.0, 30.0 + north, -80.0)) == apart
+
+    @pytest.mark.parametrize(("metres", "apart"), [(1700.0, False), (1900.0, True)])
+    def test_fixes_of_one_surfacing_scatter(self, metres, apart):
+        assert are_apart(Fix(0.0, 30.0, -80.0), Fix(10.0, 30.0 + metres / 111.2e3, -80.0)) == apart
+
+
+class TestPrior:
+    def test_before_any_dive(self):
+        state = kalman.init(JointParams(), 0.0)
+        assert state.x[OWN] == 0.35
+        assert np.sqrt(np.diag(state.cov)[[OWN, SLIP, SIDE]]) == pytest.approx([0.2, 0.018, 0.03])
+
+    def test_the_speed_wanders_by_1_5_cm_s_in_3_hours_and_slip_is_forgotten_in_a_month(self):
+        params = JointParams()
+        state = kalman.init(params, EAST.t_dive)
+        state = replace(state, x=readonly([*state.x[:-2], 0.2, 0.1]), cov=readonly(1e-12 * state.cov))
+        seen = observe(EAST)
+        passage = kalman._passage(state, seen, 27.5, params)
+        after = kalman._predicted(state, seen, passage, params)
+        assert math.sqrt(after.cov[OWN, OWN]) == pytest.approx(0.015, rel=0.01)
+        fades = math.exp(-3 / 24 / 30)
+        assert after.x[[SLIP, SIDE]] == pytest.approx([0.2 * fades, 0.1 * fades])
+
+    def test_three_quarters_of_the_physical_slip_are_real(self):
+        """On the first dive nothing else is known of it."""
+        _, info = kalman.step(None, EAST, JointParams())
+        assert info.estimate.slip[0] == pytest.approx(0.75 * slip_at(0.45), abs=0.003)
+
+    def test_bounds_of_what_is_not_known_on_board(self):
+        wild = np.array([0.0, 0.0, 3.0, -2.0, 2.0])
+        assert kalman._bounded(wild)[-3:].tolist() == [1.3, -0.1, 0.85]
+        assert kalman._bounded(-wild)[-3:].tolist() == [0.0, 0.95, -0.85]
+
+
+class TestNoise:
+    def test_the_first_guess_counts_for_six_dives_and_all_is_forgotten_in_forty(self):
+        assert learn_measurement_scale(1.0, 2.0, dives=0) == pytest.approx(1 + 1 / 6)
+        assert learn_measurement_scale(1.0, 2.0, dives=500) == pytest.approx(1 + 1 / 40)
+
+    def test_a_fault_does_not_pass_for_noise(self):
+        assert learn_measurement_scale(1.0, 1e6, dives=0) == pytest.approx(1 + 3 / 6)
+
+    def test_bounds_of_the_factors(self):
+        process, measurement = [1.0, 1.0], [1.0, 1.0]
+        for _ in range(2000):
+            process = [
+                learn_process_scale(process[0], 0.0, 0.5, 9),
+                learn_process_scale(process[1], 9.0, 0.5, 9),
+            ]
+            measurement = [
+                learn_measurement_scale(measurement[0], 0.0, 9),
+                learn_measurement_scale(measurement[1], 9.0, 9),
+            ]
+        assert process == [0.1, 40.0]
+        assert measurement == [0.02, 9.0]
+
+    def test_good_data_make_no_fault_of_a_usual_dive(self):
+        state = replace(kalman.init(JointParams(), 0.0), measurement_scale=0.02)
+        assert state.tested == 0.25
+
+
+class TestModes:
+    def test_how_often_and_how_large(self):
+        table = {mode.cause: (mode.chance, mode.size) for mode in (*MODES, modes.ROLLED)}
+        assert sum(mode.chance for mode in MODES) == pytest.approx(1.0)
+        assert table == {
+            Cause.USUAL: (pytest.approx(0.92), 0.0),
+            Cause.SPEED: (0.02, 0.2),
+            Cause.FLOW: (0.03, 0.25),
+            Cause.CURRENT: (0.02, 0.4),
+            Cause.GROUND: (0.01, 0.3),
+            Cause.WING: (9.0, 0.45),
+        }
+
+    def test_what_was_wrong_is_wrong_again_six_times_of_ten(self):
+        after = {m.cause: m.chance for m in switched(MODES, {Cause.CURRENT: 1.0})}
+        assert after[Cause.CURRENT] == pytest.approx(0.6)
+        assert sum(after.values()) == pytest.approx(1.0)
+
+
+class TestSteps:
+    def test_the_bound_is_that_which_was_measured(self):
+        """The table of `benchmarks/joint.py calibrate`: 0.43 alarms a month above 10, 0.068 above 18."""
+        assert ratio_bound(0.5) == 10.0
+        assert ratio_bound(0.5 / math.e) == pytest.approx(14.0)
+        assert ratio_bound(1.0) == ratio_bound(0.5) < ratio_bound(0.45)
+
+
+class TestKinematicSpeed:
+    def test_before_a_ratio_is_learnt(self):
+        features = DiveFeatures(3 * HOUR, None, pitch_dive=-0.45, pitch_climb=0.45)
+        features = replace(features, depth_rate_dive=0.14, depth_rate_climb=-0.14)
+        found = kinematic_speed(Ratios(), features)
+        assert found.speed == pytest.approx(vertical(features) / 1.17)
+        assert found.sigma == pytest.approx(0.15 * found.speed)
+        assert found.lies == 0.01
+        learnt = kinematic_speed(Ratios(vertical=(1.0, 1.0, 1.0)), features)
+        assert learnt.sigma == pytest.approx(0.07 * learnt.speed)
+
+    def test_the_glider_s_own_mean(self):
+        features = DiveFeatures(3 * HOUR, onboard_speed=0.25)
+        assert kinematic_speed(Ratios(onboard=(1.0, 1.0)), features) is None
+        found = kinematic_speed(Ratios(onboard=(1.0, 1.0, 1.0)), features)
+        assert (found.sigma, found.lies) == (pytest.approx(0.12 * 0.25), 0.1)
+
+    @pytest.mark.parametrize(("pitch", "tells"), [(0.14, False), (0.16, True)])
+    def test_a_flat_glide_tells_nothing(self, pitch, tells):
+        features = DiveFeatures(3 * HOUR, pitch_dive=-pitch, pitch_climb=pitch)
+        features = replace(features, depth_rate_dive=0.05, depth_rate_climb=-0.05)
+        assert (vertical(features) is not None) == tells
+
+    @pytest.mark.parametrize(("minutes", "tells"), [(59, False), (61, True)])
+    def test_a_dive_below_an_hour_tells_nothing(self, minutes, tells):
+        features = DiveFeatures(60.0 * minutes, onboard_speed=0.25)
+        assert (kinematic_speed(Ratios(onboard=(1.0,) * 3), features) is not None) == tells
+
+
+class TestNormal:
+    def range(self, speeds: list[float], settings: list[float], at: float = 0.0) -> SpeedRange | None:
+        return speed_range(Normal(readonly(speeds), readonly(settings)), at, RangeParams())
+
+    def test_a_narrow_and_a_wide_range(self):
+        narrow = self.range([0.2] * 9, [0.0] * 9)
+        assert (narrow.low, narrow.high) == (pytest.approx(0.17), pytest.approx(0.27))
+        wide = self.range([0.1, 0.3, 0.2] * 3, [0.0] * 9)
+        assert wide.low == pytest.approx(0.15)
+
+    def test_four_robust_standard_deviations(self):
+        """Speeds whose median lies 0.006 m/s off the usual: 4 times 1.4826 of that."""
+        found = self.range([0.2, 0.206, 0.194] * 5, [0.0] * 15)
+        assert found.usual - found.low == pytest.approx(4 * 0.006 / 0.67449, rel=1e-3)
+
+    @pytest.mark.parametrize(("apart", "counts"), [(0.09, True), (0.11, False)])
+    def test_settings_of_a_thruster_a_tenth_apart_are_alike(self, apart, counts):
+        speeds, settings = [0.2, 0.2, 0.4], [0.5, 0.5, 0.5 - apart]
+        assert (self.range(speeds, settings, 0.5) is not None) == counts
+
+    @pytest.mark.parametrize(
+        ("name", "value", "half"),
+        [
+            ("roll_mean", 0.01, 0.08),
+            ("pitch_dive", -0.45, 0.08),
+            ("pitch_asymmetry", 0.0, 0.1),
+            ("depth_rate_dive", 0.2, 0.15 * 0.2),
+            ("ballast_dive", 10e-6, 20e-6),
+            ("yos_per_hour", 4 / 3, 0.3 * 4 / 3),
+            ("vacuum", 30e3, 4e3),
+        ],
+    )
+    def test_half_of_a_range_at_least(self, name, value, half):
+        found = compare(self.taught(), self.FEATURES)[name]
+        assert found.usual == pytest.approx(value)
+        assert (found.high - found.low) / 2 == pytest.approx(half)
+
+    @pytest.mark.parametrize(("hours", "half"), [(1.0, 0.5), (3.0, 1.2)])
+    def test_the_duration_varies_by_half_an_hour_or_a_part(self, hours, half):
+        features = replace(self.FEATURES, duration=hours * HOUR)
+        found = compare(self.taught(features), features)["duration_h"]
+        assert (found.high - found.low) / 2 == pytest.approx(half)
+
+    @pytest.mark.parametrize(("deeper", "same"), [(4.0, True), (6.0, False)])
+    def test_yos_are_held_against_dives_of_a_like_depth(self, deeper, same):
+        features = replace(self.FEATURES, depth_max=20.0 + deeper)
+        known = self.taught(replace(self.FEATURES, depth_max=20.0))
+        assert ("yos_per_hour" in compare(known, features)) == same
+
+    @pytest.mark.parametrize(("minutes", "compared"), [(29, False), (31, True)])
+    def test_a_dive_below_half_an_hour_is_not_compared(self, minutes, compared):
+        assert bool(compare(self.taught(), replace(self.FEATURES, duration=60.0 * minutes))) == compared
+
+    def test_dozens_are_kept(self):
+        known = Baseline()
+        for k in range(400):
+            known = learn_baseline(known, replace(self.FEATURES, thruster=0.12 * (k % 8)))
+            if k == 99:
+                assert len(known.dives) == 8 * 12 + 4
+        assert len(known.dives) == 144
+        one = self.taught(n=40)
+        assert len(one.dives) == 24
+
+    FEATURES = DiveFeatures(
+        3 * HOUR,
+        roll_mean=0.01,
+        pitch_dive=-0.45,
+        pitch_climb=0.45,
+        depth_rate_dive=0.2,
+        depth_rate_climb=-0.2,
+        ballast_dive=10e-6,
+        ballast_climb=200e-6,
+        yos=4,
+        depth_max=20.0,
+        vacuum=30e3,
+    )
+
+    def taught(self, features: DiveFeatures = FEATURES, n: int = 6) -> Baseline:
+        known = Baseline()
+        for _ in range(n):
+            known = learn_baseline(known, features)
+        return known
+
+
+class TestVerdict:
+    def test_what_a_pilot_does_not_set(self):
+        params = speed_params(GliderParams())
+        assert (params.confidence, params.gate, params.least) == (1.645, 4.0, 0.05)
+        assert (params.vague, params.turned) == (0.3, 0.15)
+
+    @pytest.mark.parametrize(("degrees", "blamed"), [(43, Blame.UNCLEAR), (47, Blame.CURRENT)])
+    def test_45_degrees_tell_a_current_from_a_compass(self, degrees, blamed):
+        row = []
+        for angle in np.radians([0.0, degrees, 0.0, degrees]):
+            aside = np.array([-math.sin(angle), math.cos(angle)])
+            row.append(Misfit(0.25, float(aside @ [-0.25, 0.3]), 0.002, float(angle)))
+        assert blame(tuple(row), gate=4.0, least=0.05) is blamed
+
+    @pytest.mark.parametrize(("change", "known"), [(0.07, False), (0.09, True)])
+    def test_pitch_is_changed_by_5_degrees(self, change, known):
+        for k in (0, 1):
+            before = [-0.45, 0.45, None, None]
+            now = [p + change * (i == k) if p is not None else None for i, p in enumerate(before)]
+            assert retrimmed(tuple(before), tuple(now)) == known
+
+    @pytest.mark.parametrize(("change", "known"), [(25e-6, False), (35e-6, True)])
+    def test_ballast_is_changed_by_30_cm3(self, change, known):
+        for k in (2, 3):
+            before = (None, None, -2e-4, 2e-4)
+            now = tuple(p + change * (i == k) if p is not None else None for i, p in enumerate(before))
+            assert retrimmed(before, now) == known
+
+    @pytest.mark.parametrize(("faster", "n", "new"), [(1.6, 3, True), (1.6, 2, False)])
+    def test_three_dives_make_a_new_way_of_flying(self, faster, n, new):
+        ways = [Way()] * 12 + [Way(speed=0.23 * faster, own=0.25 * faster)] * n
+        flags = self.flown(ways)
+        assert (Flag.NORMAL in flags[12:]) == new
+
+    @pytest.mark.parametrize(("apart", "new"), [(1.08, True), (1.16, False)])
+    def test_dives_of_a_new_way_agree_to_12_percent(self, apart, new):
+        speeds = [1.6, 1.6 * apart, 1.6]
+        ways = [Way()] * 12 + [Way(speed=0.23 * f, own=0.25 * f) for f in speeds]
+        assert (self.flown(ways)[-1] is Flag.NORMAL) == new
+
+    @pytest.mark.parametrize(("roll", "hints"), [(0.1, 0), (0.14, 1)])
+    def test_a_step_of_roll_of_7_degrees(self, roll, hints):
+        state = SpeedState()
+        for each in mission([Way()] * 8 + [Way(roll=roll)]):
+            state, _ = step(state, each, SpeedParams())
+        assert state.rolled == hints
+
+    @staticmethod
+    def flown(ways: list[Way]) -> list[Flag | None]:
+        state, flags = SpeedState(), []
+        for each in mission(ways):
+            state, verdict = step(state, each, SpeedParams())
+            flags.append(verdict.flag)
+        return flags
+
+
+class TestReference:
+    FIELD = Field(
+        readonly([EAST.t_dive - HOUR, EAST.t_surface + HOUR]),
+        readonly([0.0, 20.0, 40.0, 80.0]),
+        readonly([20.0, 40.0]),
+        readonly([-90.0, -70.0]),
+        *(np.broadcast_to(np.array([0.0, 0.0, 0.2, 1.0])[:, None, None], (2, 4, 2, 2)) for _ in range(2)),
+        "test",
+    )
+
+    def test_a_model_is_10_cm_s_off_and_30_m_deep_where_no_depth_is_known(self):
+        found = of_model(self.FIELD, known_by(EAST, depth_max=None), EAST.start, EAST.end)
+        assert np.sqrt(np.diag(found.cov)) == pytest.approx([0.1, 0.1])
+        deep = of_model(self.FIELD, known_by(EAST, depth_max=30.0), EAST.start, EAST.end)
+        assert found.current == deep.current
+        assert len(found.notes[0]) > len(deep.notes[0])
