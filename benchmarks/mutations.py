@@ -32,11 +32,12 @@ PACKAGE = ROOT / "src" / "gliderwatch"
 TESTS = {
     "navigation": "unit/test_heuristics_navigation unit/test_current unit/test_dives unit/test_features"
     " unit/test_fixes unit/test_flight unit/test_samples unit/test_track",
-    "sea": "unit/test_heuristics_sea unit/test_flow unit/test_currents_augmented unit/test_currents_state"
-    " unit/test_currents_constituents unit/test_currents_field integration/test_ocean",
-    "estimation": "unit/test_heuristics_estimation unit/test_speed unit/test_consistency unit/test_range"
-    " unit/test_baseline unit/test_evidence_usual unit/test_reckoned unit/test_sequential"
-    " unit/test_learner unit/test_adaptive unit/test_glider_estimate unit/test_joint",
+    "sea": "unit/test_heuristics_sea unit/test_flow unit/test_currents_field unit/test_currents_constituents"
+    " integration/test_ocean",
+    "estimation": "unit/test_heuristics_estimation unit/test_consistency unit/test_range unit/test_baseline"
+    " unit/test_reckoned unit/test_sequential unit/test_learner unit/test_speed unit/test_joint"
+    " unit/test_glider_estimate",
+    "layers": "unit/test_heuristics_layers unit/test_layers unit/test_layer_advice unit/test_layers_water",
     "forecast": "unit/test_heuristics_forecast unit/test_forecast_flow unit/test_forecast_steering"
     " unit/test_forecast_surfacing unit/test_forecast_timing unit/test_forecast_waypoints"
     " property/test_forecast",

@@ -105,3 +105,24 @@ def test_a_depth_that_is_there_is_kept(station: Path) -> None:
     station.with_suffix(".tbd").write_bytes(science())
     assert decode(station, [station.parent]).completeness == own.completeness
     assert own.get("depth").v.max() > 20
+
+
+def test_what_the_science_file_measures_is_read_where_a_field_is_made_of_it(station: Path) -> None:
+    wanted = (*SCIENCE, ("sci_water_temp", 4, "degc"))
+    rows = [
+        {
+            "sci_m_present_time": dinkum.OPENED_AT + 90.0 * i,
+            "sci_water_pressure": 1.0,
+            "sci_water_temp": 9.0 + i,
+        }
+        for i in range(20)
+    ]
+    (station.parent / f"{OTHER}.cac").write_bytes(dinkum.sensor_list(wanted, OTHER))
+    head = dinkum.header(NAME, crc=OTHER, n_held=3, filename_extension="tbd")
+    before = decode(station, [station.parent], science=True)
+    station.with_suffix(".tbd").write_bytes(head + dinkum.cycles(rows, wanted))
+    plain, whole = decode(station, [station.parent]), decode(station, [station.parent], science=True)
+    assert "temperature" not in plain.quantities
+    assert whole.get("temperature").v == pytest.approx(9.0 + np.arange(1, 20), abs=1e-4)
+    assert whole.get("science_pressure").v == pytest.approx(1e5)
+    assert whole.completeness > before.completeness  # so that it takes the place of what came without it

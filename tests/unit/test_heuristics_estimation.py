@@ -2,15 +2,17 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from gliderwatch.estimation import kalman, modes
+from gliderwatch.estimation import adaptive, glider, kalman, modes, verdict
 from gliderwatch.estimation.dive_measurement import (
     OWN,
     SIDE,
     SLIP,
+    Measured,
     Slipping,
     are_apart,
     drag_slip,
@@ -25,8 +27,8 @@ from gliderwatch.estimation.kalman import JointParams, learn_measurement_scale, 
 from gliderwatch.estimation.kinematic_speed import Ratios, kinematic_speed, vertical
 from gliderwatch.estimation.modes import MODES, Cause, switched
 from gliderwatch.estimation.speed_range import Normal, RangeParams, SpeedRange, speed_range
-from gliderwatch.estimation.step_test import ratio_bound
-from gliderwatch.estimation.unassessed import of_model
+from gliderwatch.estimation.step_test import Bank, Update, ratio_bound, steps
+from gliderwatch.estimation.unassessed import Reference, of_model
 from gliderwatch.estimation.verdict import (
     Blame,
     Misfit,
@@ -36,7 +38,7 @@ from gliderwatch.estimation.verdict import (
     retrimmed,
     step,
 )
-from gliderwatch.model import Dive, DiveFeatures, Fix, Flag, readonly
+from gliderwatch.model import Current, Dive, DiveFeatures, Fix, Flag, readonly
 from gliderwatch.params import GliderParams
 from gliderwatch.sea.ocean_field import Field
 from joint_support import HOUR, Way, dive, mission
@@ -416,8 +418,8 @@ class TestVerdict:
     def flown(ways: list[Way]) -> list[Flag | None]:
         state, flags = SpeedState(), []
         for each in mission(ways):
-            state, verdict = step(state, each, SpeedParams())
-            flags.append(verdict.flag)
+            state, found = step(state, each, SpeedParams())
+            flags.append(found.flag)
         return flags
 
 
@@ -437,3 +439,88 @@ class TestReference:
         deep = of_model(self.FIELD, known_by(EAST, depth_max=30.0), EAST.start, EAST.end)
         assert found.current == deep.current
         assert len(found.notes[0]) > len(deep.notes[0])
+
+
+class TestSeveralDives:
+    def test_what_is_remembered_of_forty_dives(self):
+        """Steps are looked for over 24 dives, a compass over 8; ranges and ratios rest on 24 and 12."""
+        state = SpeedState()
+        for each in mission([Way()] * 40):
+            state, _ = step(
+                state, known_by(each, depth_rate_dive=0.14, depth_rate_climb=-0.14), SpeedParams()
+            )
+        assert len(state.filter.bank.score) == 24
+        assert len(state.misfits) == 8
+        assert len(state.normal.speeds) == 24
+        assert len(state.ratios.vertical) == 12
+
+    def bank(self, innovation: float) -> Bank:
+        """After one dive whose four measurements show the four numbers of a step, each to 1 m/s."""
+        update = Update(np.eye(4, 6), np.zeros((6, 4)), np.eye(4), np.array([innovation, 0.0, 0.0, 0.0]))
+        jump = np.concatenate([np.eye(2), np.zeros((4, 2))])
+        return steps(Bank(), np.eye(6), update, jump, JointParams().front)[2]
+
+    def test_sizes_of_a_step(self):
+        """Slip and side change by 0.5, the flow with them by 0.25 m/s."""
+        assert np.linalg.inv(self.unseen().info[0]).diagonal() == pytest.approx([0.25, 0.25, 0.0625, 0.0625])
+
+    def unseen(self) -> Bank:
+        update = Update(np.zeros((1, 6)), np.zeros((6, 1)), np.eye(1), np.zeros(1))
+        return steps(Bank(), np.eye(6), update, np.zeros((6, 2)), JointParams().front)[2]
+
+    def test_no_dive_alone_proves_a_step(self):
+        assert np.array_equal(self.bank(4.0).score, self.bank(40.0).score)
+        assert not np.array_equal(self.bank(3.9).score, self.bank(40.0).score)
+
+    @pytest.mark.parametrize(("hours", "total"), [(3.0, 0.25), (1.5, 0.125), (6.0, 0.25)])
+    def test_a_tenth_of_the_speed_adds_a_quarter(self, hours, total):
+        """Healthy gliders vary by 8 %, which does not add; a dive of half the length counts for half."""
+        estimate = SimpleNamespace(speed=0.225, own_sigma=0.001)
+        seen = SimpleNamespace(start=0.0, end=hours * HOUR, is_free=False)
+        info = SimpleNamespace(seen=seen, estimate=estimate, believes=True)
+        state, _, _ = verdict._small_losses(SpeedState(), info, SpeedRange(0.2, 0.25, 0.3, 9), SpeedParams())
+        assert state.slow == pytest.approx(total)
+
+    @pytest.mark.parametrize(("hidden", "words"), [(0.08, "slower than normal"), (0.12, "wing")])
+    def test_a_tenth_of_the_speed_is_hidden_from_the_glider(self, hidden, words):
+        info = SimpleNamespace(
+            estimate=SimpleNamespace(own_speed=0.25, speed=0.25 * (1 - hidden)),
+            seen=SimpleNamespace(slip=0.0),
+        )
+        assert words in verdict._how_slow(info, SpeedRange(0.2, 0.25, 0.3, 9), SpeedParams())
+
+
+class TestOpened:
+    def explained(self) -> list[modes.Explained]:
+        params = JointParams()
+        state = kalman.init(params, EAST.t_dive)
+        measured = Measured(observe(EAST), None, 1.0, Slipping(0.1, 0.01, None))
+        return kalman._explained(state, measured, params, hint=True).ways
+
+    def test_a_wrong_measurement_is_left_out(self):
+        (wrong,) = (way for way in self.explained() if way.cause is Cause.CURRENT)
+        assert wrong.noise[2:, 2:].diagonal().tolist() == [100.0, 100.0]
+
+    def test_a_wing_opens_slip_and_a_third_of_it_side(self):
+        state = kalman.init(JointParams(), 0.0)
+        (wing,) = (way for way in self.explained() if way.cause is Cause.WING)
+        steps_of_flow = kalman._jump(JointParams().flow)
+        opened = kalman._cov(state, wing, steps_of_flow) - state.cov
+        assert np.sqrt(opened[[SLIP, SIDE], [SLIP, SIDE]]) == pytest.approx([0.45, 0.15])
+
+
+class TestAlgorithmOfThePaper:
+    @pytest.mark.parametrize(("hours", "stands_in"), [(11.9, True), (12.1, False)])
+    def test_a_current_stands_in_for_12_hours(self, hours, stands_in):
+        state = adaptive.Learner(current=EAST.current, current_t=EAST.t_surface - hours * HOUR)
+        assert adaptive._reference(state, replace(EAST, current=None))[1] == stands_in
+
+    def test_it_warms_up_for_three_time_constants(self):
+        p = adaptive.learner_params(GliderParams())
+        assert adaptive.warm_up(GliderParams()) == pytest.approx(3 * p.k / p.rate_of_speed)
+
+    @pytest.mark.parametrize(("sigmas", "apart"), [(3.9, False), (4.1, True)])
+    def test_flow_and_reference_are_four_standard_errors_apart(self, sigmas, apart):
+        found = SimpleNamespace(flow=np.zeros(2), flow_cov=np.eye(2) * 0.75)
+        other = Reference(Current(sigmas, 0.0, final=True), np.eye(2) * 0.25)
+        assert glider._apart(found, other) == apart

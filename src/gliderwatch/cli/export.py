@@ -146,7 +146,7 @@ def where(
     state: Path | None,
     at: str | None,
 ) -> None:
-    """Tell where gliders are now, also under water, and how sure that is."""
+    """Show where gliders are now, also under water, and how sure that is."""
     import msgspec
 
     from gliderwatch.export import ais as virtual

@@ -128,7 +128,7 @@ def doctor(config_path: Path, send: bool, as_json: bool) -> None:
 @config_option
 @json_option
 def status(config_path: Path, as_json: bool) -> None:
-    """Tell how the service and its gliders are.
+    """Show how the service and its gliders are.
 
     It ends with 0: the service is alive, 1: it is not, 2: that cannot be told.
     """
@@ -157,7 +157,7 @@ def status(config_path: Path, as_json: bool) -> None:
     "--sample",
     type=click.Choice(SAMPLES),
     metavar="KIND",
-    help=f"Send a whole message, marked as a sample: {', '.join(SAMPLES)}.",
+    help=f"Send a complete message, marked as a sample: {', '.join(SAMPLES)}.",
 )
 def test_alert(config_path: Path, only: str | None, sample: str | None) -> None:
     """Send a test message to every channel, or to one.

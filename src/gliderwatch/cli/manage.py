@@ -153,7 +153,7 @@ def unmute_glider(config: Config, glider: str, now: float) -> list[str]:
 @click.option("--all", "every", is_flag=True, help="Also those that are over.")
 @json_option
 def incidents(config_path: Path, glider: str | None, every: bool, as_json: bool) -> None:
-    """Tell which incidents are open, and who has acknowledged them."""
+    """List the open incidents, and who has acknowledged them."""
     import msgspec
 
     from gliderwatch.cli import tables
@@ -178,7 +178,7 @@ def incidents(config_path: Path, glider: str | None, every: bool, as_json: bool)
 @click.option("--hours", type=float, help="Hours from now on.")
 @config_option
 def mute(config_path: Path, glider: str, until: str | None, hours: float | None) -> None:
-    """Tell nothing of a glider for a time."""
+    """Send no messages about a glider for a time."""
     from gliderwatch.config import load
 
     now = time.time()
@@ -190,7 +190,7 @@ def mute(config_path: Path, glider: str, until: str | None, hours: float | None)
 @click.argument("glider")
 @config_option
 def unmute(config_path: Path, glider: str) -> None:
-    """Take back what `mute` did."""
+    """End a mute."""
     from gliderwatch.config import load
 
     click.echo("\n".join(unmute_glider(load(config_path), glider, time.time())))
@@ -229,7 +229,7 @@ def ack(config_path: Path, incident: str, by: str | None, note: str, undo: bool)
 @click.argument("file", type=FILE)
 @config_option
 def backup(config_path: Path, file: Path) -> None:
-    """Copy the state to a file while the service runs, and see that the copy is whole."""
+    """Copy the state to a file while the service runs, and check the copy."""
     from gliderwatch.cli.options import not_on_dockserver
     from gliderwatch.config import load
     from gliderwatch.store.maintenance import backup as make
@@ -244,7 +244,7 @@ def backup(config_path: Path, file: Path) -> None:
 @click.option("--keep", is_flag=True, help="Put the result in place of what is known; the service must rest.")
 @config_option
 def rebuild(config_path: Path, glider: str, keep: bool) -> None:
-    """Assess a glider anew from its files.
+    """Assess a glider again from its files.
 
     It ends with 1 where that changes something and is not kept.
     """

@@ -1,4 +1,4 @@
-"""What the commands share: options, where they may write, how they fail, a group with its whole help."""
+"""What the commands share: options, where they may write, how they fail, a group whose help is not cut."""
 
 from __future__ import annotations
 

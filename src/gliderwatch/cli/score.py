@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     help="A folder with the files of a real, healthy mission: faults are grafted onto it.",
 )
 def score(out: Path, name: str, names: tuple[str, ...], missions: tuple[Path, ...]) -> None:
-    """Score the detection: simulated and real missions through the whole program.
+    """Score the detection: simulated and real missions through the installed program.
 
     OUT will hold score.json, score.html and, cell by cell, what they were made of.
     """

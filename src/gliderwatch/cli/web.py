@@ -19,7 +19,7 @@ from gliderwatch.errors import GliderwatchError
 @click.option("--link", help="Do not serve: print the link that acknowledges this incident.")
 @click.option("--for", "recipient", help="Who acknowledges by it.")
 def web(config_path: Path, link: str | None, recipient: str | None) -> None:
-    """Serve the pages live, an API, and links that acknowledge, on this machine alone.
+    """Serve the pages live, an API, and links that acknowledge, on this machine only.
 
     It reads the state file; the service need not run, but should.
     """

@@ -262,7 +262,7 @@ TURNED = 0.785
 OWN_SURE = 0.15
 """Standard error of W on a dive, as part of it, up to which the dive tells what W is to what is reported."""
 ROLL_STEP = 0.12
-"""rad: a step of the mean roll that speaks for a lost or bent wing."""
+"""rad: a step of the mean roll that speaks for a lost or bent wing. Healthy gliders roll within 0.05."""
 ROLL_CONFIRMS = 0.67
 """Standard errors by which a speed must be below normal where the glider rolls otherwise for two dives:
 three to one."""

@@ -76,17 +76,17 @@ class Step:
     @property
     def size(self) -> float:
         """Size of the step."""
-        return float((np.linalg.inv(self.info) @ self.score)[self.which])
+        return float(np.linalg.solve(self.info, self.score)[self.which])
 
     @property
     def shift(self) -> Array:
         """By how much the state is off by all of it, (n,)."""
-        return np.asarray(self.shifts @ (np.linalg.inv(self.info) @ self.score))
+        return np.asarray(self.shifts @ np.linalg.solve(self.info, self.score))
 
     @property
     def cov(self) -> Array:
         """Covariance of `shift`, (n, n)."""
-        shifted = self.shifts @ np.linalg.inv(self.info) @ self.shifts.T
+        shifted = self.shifts @ np.linalg.solve(self.info, self.shifts.T)
         return np.asarray((shifted + shifted.T) / 2)
 
 
@@ -119,7 +119,7 @@ def likeliest(bank: Bank, which: int, sign: int = 0) -> Step | None:
         return None
     rest = [i for i in range(bank.score.shape[1]) if i != which]
     cross = bank.info[:, [which]][:, :, rest]
-    used = cross @ np.linalg.inv(bank.info[:, rest][:, :, rest])
+    used = np.linalg.solve(bank.info[:, rest][:, :, rest], np.swapaxes(cross, 1, 2)).swapaxes(1, 2)
     info = bank.info[:, which, which] - (used @ np.swapaxes(cross, 1, 2))[:, 0, 0]
     score = bank.score[:, which] - (used @ bank.score[:, rest, None])[:, 0, 0]
     ratio = np.where(score * sign >= 0, score**2 / info, 0.0)
