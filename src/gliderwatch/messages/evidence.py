@@ -14,7 +14,6 @@ from gliderwatch.model import Assessment, Kind
 
 # Bounds above (or below) which a number is worth a line; they change no flag.
 MISFIT = 0.05  # m/s across the heading; a few mm/s to 2 cm/s when fixes, compass and current agree
-PITCH_DIFFERENCE = 0.087  # rad between dive and climb: 5 degrees
 RATE_RATIO = 1.5  # between descent and climb
 STEADY = 0.98  # length of the mean heading vector
 SHORT_DIVE = 1.0  # h
