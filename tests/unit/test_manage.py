@@ -142,7 +142,7 @@ class TestAcknowledged:
         assert is_new and noted.incident.id == "electa/anomaly/1667639520"
         given = give_incident_back(config, "electa", "ann", "", NOW + 60)
         assert given.ack is None and incident_entries(config) == [given]
-        with reading(config) as store:
+        with manage.reading(config) as store:
             made = [a for a in store.alerts() if a.kind is Kind.ACKNOWLEDGED]
         assert [a.title for a in made] == [
             "electa ann is on it (anomaly)",
