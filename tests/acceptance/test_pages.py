@@ -15,6 +15,7 @@ import httpx
 from acceptance.angus import FILES, put, taken
 from acceptance.support import GLIDERWATCH, Daemon, Site, command, mail_server, remora, until
 from gliderwatch.simulate.delivery import arrivals
+from gliderwatch.store.state_file import Store
 
 
 def with_pages(site: Site) -> Path:
@@ -68,6 +69,8 @@ def test_pages_of_a_replay_are_written_by_command(site: Site, tmp_path: Path) ->
 
 
 def test_pages_are_not_written_on_the_dockserver(site: Site) -> None:
+    site.state.parent.mkdir()
+    Store.open(site.state).close()
     result = command("pages", "-c", site.config, "--out", site.root / "pages")
     assert result.returncode == 2
     assert "nothing is written there" in result.stderr

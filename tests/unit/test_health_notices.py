@@ -118,3 +118,13 @@ def test_every_rule_has_words(rule: str) -> None:
 def test_blocks_rise_with_values() -> None:
     assert blocks([1.0, 2.0, 3.0]) == "▁▅█"
     assert all(a <= b for a, b in itertools.pairwise(blocks([float(v) for v in range(10)])))
+
+
+def test_trend_is_over_after_two_days_of_files() -> None:
+    def leak(k: int, is_there: bool) -> Row:
+        t = T0 + 3 * HOUR * k
+        return t, {"slow_leak": finding(t, W, "slow_leak") if is_there else None}
+
+    (still,) = health_incidents("a", [leak(0, True), *(leak(k, False) for k in range(1, 16))])
+    (over,) = health_incidents("a", [leak(0, True), *(leak(k, False) for k in range(1, 17))])
+    assert still.cleared_at is None and over.cleared_at is not None

@@ -39,6 +39,10 @@ def test_it_is_not_reported_again_for_a_week_nor_called_over():
     assert alerts[1].time - alerts[0].time > 7 * 86400
 
 
+def test_on_one_course_what_all_share_is_a_current():
+    assert reported(*[replace(ALL, one_way=0.9)] * 3)[1] == []
+
+
 def test_what_all_share_is_one_message_for_all():
     first = reported(ALL, ALL)[1][0]
     _, notices = announce("b", Comparison(T, Fault.TURN, 1), ALL, T + 3 * HOUR)

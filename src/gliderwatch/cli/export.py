@@ -31,22 +31,22 @@ at_option = click.option(
 )
 
 
-@contextmanager
-def looking(
-    config_path: Path | None, state: Path | None, at: str | None
-) -> Iterator[tuple[Config | None, Store, float]]:
-    """The configuration, where one is named or needed; the state file, for looking; and as of when (s).
-
-    Raises GliderwatchError where one of them cannot be had.
-    """
+def configuration(config_path: Path | None, state: Path | None) -> Config | None:
+    """The configuration; None where none is named, and a state file is. Raises ConfigError."""
     from gliderwatch.config import load
+
+    if state is not None and config_path is None:
+        return None
+    return load(configured(config_path or DEFAULT))
+
+
+@contextmanager
+def looking(config: Config | None, state: Path | None, at: str | None) -> Iterator[tuple[Store, float]]:
+    """The state file, for looking, and as of when (s). Raises GliderwatchError where one cannot be had."""
     from gliderwatch.config.fields import moment
     from gliderwatch.pages import reading
     from gliderwatch.store.state_file import Store
 
-    config = None
-    if state is None or config_path is not None:
-        config = load(configured(config_path or DEFAULT))
     store = Store.reading(state or Path(config.state.path if config is not None else ""))
     try:
         with store.guarded():
@@ -58,7 +58,7 @@ def looking(
                     raise GliderwatchError(f"--at {error}") from None
             elif state is not None:
                 now = min(now, (reading.last_news(store) or now) + 3600.0)
-            yield config, store, now
+            yield store, now
     finally:
         store.close()
 
@@ -71,7 +71,8 @@ def viewing(
     from gliderwatch.pages import reading
     from gliderwatch.params import Attention
 
-    with looking(config_path, state, at) as (config, store, now):
+    config = configuration(config_path, state)
+    with looking(config, state, at) as (store, now):
         names = store.gliders()
         if glider is not None and glider.lower() not in names:
             raise GliderwatchError(

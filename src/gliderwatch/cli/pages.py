@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from gliderwatch.cli.export import at_option, looking, only_config_option, state_option
+from gliderwatch.cli.export import at_option, configuration, looking, only_config_option, state_option
 from gliderwatch.cli.options import example, not_on_dockserver
 
 # ruff: noqa: PLC0415
@@ -28,12 +28,13 @@ def pages(config_path: Path | None, state: Path | None, out: Path | None, at: st
     from gliderwatch.params import Attention
     from gliderwatch.service import page_writer
 
-    with looking(config_path, state, at) as (config, store, now):
-        folder = out or (Path(config.pages.folder) if config is not None and config.pages.folder else None)
-        if folder is None:
-            raise click.UsageError("name the folder: --out FOLDER, or pages.folder in the configuration")
-        if config is not None:
-            not_on_dockserver(config, folder / "index.html")
+    config = configuration(config_path, state)
+    folder = out or (Path(config.pages.folder) if config is not None and config.pages.folder else None)
+    if folder is None:
+        raise click.UsageError("name the folder: --out FOLDER, or pages.folder in the configuration")
+    if config is not None:
+        not_on_dockserver(config, folder / "index.html")
+    with looking(config, state, at) as (store, now):
         known = store.gliders()
         names = {*known, *(config.gliders if config is not None and state is None else ())}
         attention = {n: config.attention(n) if config is not None else Attention() for n in names}

@@ -33,6 +33,7 @@ from gliderwatch.fleet.constants import (
     LEAST_TURN,
     MOST_CURRENTS,
     MOST_DIVES,
+    MOST_ONE_WAY,
     NEAR,
     SEA_EDDIES,
     SEA_MEAN,
@@ -81,7 +82,8 @@ class Check:
     """What the comparison of a glider with its ``neighbours`` (names, with ``nearest``, m) shows.
 
     ``found`` is the likeliest fault of it (None: none is likely), ``others`` the likeliest of another glider,
-    ``common`` the likeliest that all have alike (its ``glider`` is empty).
+    ``common`` the likeliest that all have alike (its ``glider`` is empty); ``one_way`` is the length of their
+    mean course.
     """
 
     neighbours: tuple[str, ...]
@@ -89,6 +91,7 @@ class Check:
     found: Hypothesis | None
     others: Hypothesis | None
     common: Hypothesis | None = None
+    one_way: float = 0.0
 
     @property
     def sure(self) -> Hypothesis | None:
@@ -98,7 +101,7 @@ class Check:
             h.ratio if h is not None else 0.0 for h in (self.found, self.others, self.common)
         )
         if common > max(own, other) + CLEARER:
-            return self.common if _is_large(self.common) else None
+            return self.common if self.one_way < MOST_ONE_WAY and _is_large(self.common) else None
         return self.found if own > max(other, common) + CLEARER and _is_large(self.found) else None
 
 
@@ -131,6 +134,7 @@ def cross_check(currents: Iterable[DiveCurrent], glider: str) -> Check | None:
         _likeliest(each for each in found if each.glider == glider),
         _likeliest(each for each in found if each.glider not in ("", glider)),
         _likeliest(each for each in found if not each.glider),
+        float(np.hypot(*np.mean([each.course for each in chosen], axis=0))),
     )
 
 

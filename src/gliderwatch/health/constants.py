@@ -98,3 +98,8 @@ CRITICAL_DEVICES = frozenset(
 """Devices without which a glider does not steer, turn or call (devices whose failure aborts a mission)."""
 LAST_CALLS = 10
 """Calls of which the part is counted that was cut."""
+CLEAR_AFTER = 4
+"""Segments or calls in a row in which a rule finds nothing that clear its incident: the file and the log of
+two surfacings. One that is at its limit is not reported again at each."""
+CLEAR_TREND_AFTER = 16
+"""The same of a trend, whose error varies: two days of files (measured: with 4 two of ten came twice)."""

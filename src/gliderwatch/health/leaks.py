@@ -10,6 +10,7 @@ from scipy.special import ndtr, stdtrit
 
 from gliderwatch.health.constants import (
     ATMOSPHERE,
+    CLEAR_TREND_AFTER,
     COOL,
     DAY,
     INHG,
@@ -176,4 +177,5 @@ SLOW_LEAK = Rule(
         ),
     ),
     "The trend of the vacuum, by the density of the gas in the hull, at depth and at the surface apart.",
+    clear_after=CLEAR_TREND_AFTER,
 )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gliderwatch.health.constants import ROBUST, SHOWN
+from gliderwatch.health.constants import CLEAR_AFTER, ROBUST, SHOWN
 from gliderwatch.health.readings import History
 from gliderwatch.model import Array, Series, Severity
 
@@ -51,13 +51,15 @@ Judge = Callable[[History, Limits], Finding | None]
 @dataclass(frozen=True, slots=True)
 class Rule:
     """A rule by ``name``: ``judge`` is asked where one of its ``quantities`` has a fresh reading (a name that
-    ends with a colon stands for all that begin with it); ``about`` says what it is about."""
+    ends with a colon stands for all that begin with it); ``about`` says what it is about. After so many
+    segments or calls in a row in which it finds nothing (``clear_after``) its incident is over."""
 
     name: str
     quantities: tuple[str, ...]
     judge: Judge
     limits: tuple[Limit, ...]
     about: str
+    clear_after: int = CLEAR_AFTER
 
     def sees(self, history: History) -> bool:
         """Whether there is anything new that it could look at."""

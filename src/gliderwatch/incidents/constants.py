@@ -98,6 +98,3 @@ SLACK = 0.2
 
 UNTIL_COME = 3600.0
 """Seconds after a call after which a file that was announced in it has come, or does not."""
-HEALTH_CLEAR_AFTER = 4
-"""Segments or calls in a row in which a rule of health finds nothing that clear its incident: the file and
-the log of two surfacings. One that is at its limit is not told again at each."""

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 from gliderwatch.health.constants import REMEMBERED
 from gliderwatch.health.rule import Finding
-from gliderwatch.health.rules import Judged
+from gliderwatch.health.rules import RULES, Judged
 from gliderwatch.incidents.acknowledgement import Acks, is_taken_on
-from gliderwatch.incidents.constants import HEALTH_CLEAR_AFTER, NEWS
+from gliderwatch.incidents.constants import NEWS
 from gliderwatch.incidents.notices import (
     Content,
     HealthFound,
@@ -32,12 +32,13 @@ def health_incidents(glider: str, rows: Iterable[tuple[float, Judged]]) -> tuple
     done: list[HealthIncident] = []
     open_: dict[str, HealthIncident] = {}
     normal: dict[str, int] = {}
+    needed = {rule.name: rule.clear_after for rule in RULES}
     for t, judged in rows:
         for rule, finding in judged.items():
             before = open_.get(rule)
             phase = Phase.OK if before is None else Phase.OPEN
             normal[rule] = 0 if finding is not None else normal.get(rule, 0) + 1
-            after = TRANSITIONS[phase, _event(phase, finding, normal[rule])]
+            after = TRANSITIONS[phase, _event(phase, finding, normal[rule] >= needed.get(rule, 1))]
             if finding is not None:
                 open_[rule] = _opened(glider, t, finding) if before is None else _worse(before, finding)
             elif before is not None and after is Phase.OK:
@@ -45,11 +46,11 @@ def health_incidents(glider: str, rows: Iterable[tuple[float, Judged]]) -> tuple
     return tuple(sorted((*done, *open_.values()), key=lambda i: (i.opened_at, i.id)))
 
 
-def _event(phase: Phase, finding: Finding | None, normal: int) -> Event:
+def _event(phase: Phase, finding: Finding | None, is_normal: bool) -> Event:
     """What a segment or call means for a rule: each rule has two readings in a row in it already."""
     if finding is not None:
         return Event.CONFIRMED if phase is Phase.OK else Event.FLAGGED
-    return Event.CLEARED if phase is Phase.OPEN and normal >= HEALTH_CLEAR_AFTER else Event.NORMAL
+    return Event.CLEARED if phase is Phase.OPEN and is_normal else Event.NORMAL
 
 
 def _opened(glider: str, t: float, finding: Finding) -> HealthIncident:

@@ -10,8 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gliderwatch.layers.casts import Cast
-from gliderwatch.layers.constants import BRIDGED, ERRORS, FLOORS, LEAST_CASTS, PART_OF_PEAK
+from gliderwatch.layers.constants import (
+    BRIDGED,
+    DENSITY_FLOOR,
+    ERRORS,
+    LEAST_CASTS,
+    PART_OF_PEAK,
+    SALINITY_FLOOR,
+    TEMPERATURE_FLOOR,
+)
 from gliderwatch.model import Array, readonly
+
+FLOORS = {"temperature": TEMPERATURE_FLOOR, "salinity": SALINITY_FLOOR, "density": DENSITY_FLOOR}
+"""Unit per m: a gradient of a property below it is no layer; other properties have none."""
 
 
 @dataclass(frozen=True, slots=True)

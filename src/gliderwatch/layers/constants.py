@@ -14,9 +14,13 @@ LEAST_CASTS = 2
 """A bin counts in the composite where so many casts went through it: one alone may be a spike."""
 PART_OF_PEAK = 0.25
 """A layer is where the gradient is above this part of its peak; 004 uses J_thr from 0.2 to 0.8."""
-FLOORS = {"temperature": 0.02, "salinity": 0.005, "density": 0.01}
-"""Unit per m: a gradient below is no layer, however even the water is. Of temperature that of well-mixed
-water with its internal waves in the missions of usf-sam, maria and electa; the others as much, by density."""
+TEMPERATURE_FLOOR = 0.02
+"""Degree C per m: a gradient below is no layer, however even the water is: that of well-mixed water with its
+internal waves in the missions of usf-sam, maria and electa."""
+SALINITY_FLOOR = 0.005
+"""1/m: the same of salinity, as much by density."""
+DENSITY_FLOOR = 0.01
+"""kg/m3 per m: the same of density."""
 ERRORS = 2.0
 """Standard errors of the median by which the gradient has to differ from nothing."""
 BRIDGED = 1
