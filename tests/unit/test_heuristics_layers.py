@@ -122,3 +122,7 @@ def test_half_of_the_reference_is_the_least(difference: float, mode: Mode) -> No
 def test_a_day_and_a_half_in_the_band_is_the_most(hours: float, mode: Mode) -> None:
     seen = [c.within(80.0, 120.0) for c in casts(84.0, 116.0, t=hours * 3600.0 - 5000.0)]
     assert follow(KNOWN, seen, "temperature").mode is mode
+
+
+def test_two_casts_show_a_layer() -> None:
+    assert follow(Tracking(), casts(100.0, 120.0)[:2], "temperature").mode is Mode.TRACK

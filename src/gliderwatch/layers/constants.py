@@ -23,7 +23,7 @@ DENSITY_FLOOR = 0.01
 """kg/m3 per m: the same of density."""
 ERRORS = 2.0
 """Standard errors of the median by which the gradient has to differ from nothing."""
-BRIDGED = 1
+BRIDGED = 1.0
 """Bins that a gap within a layer may have: noise cuts layers in two."""
 LEAST_EXTENSION = 2.0
 """m: what is added above and below a layer, where a bin is smaller."""
