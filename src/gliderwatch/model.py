@@ -379,6 +379,7 @@ class Kind(StrEnum):
     UNKNOWN = "unknown"
     REGIME = "regime"
     SURFACING = "surfacing"
+    ACKNOWLEDGED = "acknowledged"
     ABORT = "abort"
     CALL = "call"
     HEALTH = "health"
@@ -414,7 +415,8 @@ class Alert:
 
     ``incident`` names the thread (empty for surfacing notices and operator messages), ``time`` is the
     surfacing that caused it, ``audience`` the severity that decides who gets it (an all-clear
-    goes to whoever got the alarm).
+    goes to whoever got the alarm). ``body`` is a mail's text, ``html`` the same as HTML, ``brief`` what a
+    chat shows of it (empty in messages of earlier releases: all).
     """
 
     id: str
@@ -427,3 +429,4 @@ class Alert:
     title: str
     body: str
     html: str
+    brief: str = ""

@@ -99,5 +99,5 @@ def said(case: Case, folder: Path) -> Said:
 
 
 def about_files(titles: Iterator[str] | list[str]) -> list[str]:
-    """Those of the operator's messages, without the name of the program."""
-    return [t.removeprefix("GLIDERWATCH: ") for t in titles if t.startswith("GLIDERWATCH: ")]
+    """Those of messages about files that are wrong."""
+    return [t.strip() for t in titles if any(f" {word} " in t for word in ("CLOCK", "TWO GLIDERS"))]

@@ -41,6 +41,6 @@ def test_what_nobody_acknowledges_reaches_the_chief(tmp_path: Path) -> None:
             until(lambda: chief.mails, "the chief is told")
             until(lambda: site.undelivered() == 0, "nothing is left to tell")
     assert len(chief.times()) == 1
-    assert "NOT ACKNOWLEDGED ANOMALY bruce" in chief.mails[0].subject
+    assert "NOT ACKNOWLEDGED bruce SLOW" in chief.mails[0].subject
     assert "gliderwatch ack bruce/anomaly/" in chief.mails[0].text
     assert TRACEBACK not in daemon.text()

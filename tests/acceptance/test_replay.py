@@ -239,7 +239,7 @@ def test_what_is_piped_holds_the_alerts_also_while_a_bar_is_on_the_terminal(miss
         os.close(terminal)
         reader.join()
         os.close(main)
-    assert b"ANOMALY bruce" in result.stdout
+    assert b"bruce SLOW" in result.stdout
 
 
 def test_tables_fit_a_terminal(mission: Path) -> None:

@@ -121,5 +121,5 @@ def test_the_two_commands_of_the_readme_run_by_themselves(shell: dict[str, str],
             line, shell=True, cwd=tmp_path, env=shell, capture_output=True, text=True, check=False
         )
         assert done.returncode == 0, done.stderr
-    assert "ANOMALY sim-01" in done.stdout
+    assert "sim-01 SLOW" in done.stdout
     assert lines(tmp_path / "results" / "alerts.jsonl")

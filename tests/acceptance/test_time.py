@@ -83,7 +83,7 @@ def test_files_of_1970_are_named_and_files_dated_in_the_future_are_taken(tmp_pat
             taken(site, *arrivals(flown))
             wanted = [Status.QUARANTINED] * len(lost)
             until(lambda: site.statuses(*(file.name for file in lost)) == wanted, "quarantined")
-            until(lambda: any("ANOMALY" in mail.subject for mail in box.mails), "told")
+            until(lambda: any(" SLOW " in mail.subject for mail in box.mails), "told")
             assert daemon.stop() == 0
     assert {site.files()[file.name].reason for file in lost} == {
         "opened in the year 1970: the glider's clock was wrong"

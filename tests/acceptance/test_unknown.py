@@ -50,13 +50,13 @@ def test_pilots_hear_that_nothing_can_be_judged_and_that_it_can_again(tmp_path: 
             until(lambda: box.mails, "the pilot is told")
             assert [f.status for f in site.files().values()].count(Status.WAITING) > 60
             (mail,) = box.mails
-            assert "CANNOT BE JUDGED cora: " in mail.subject
+            assert "cora CANNOT BE JUDGED for " in mail.subject
             assert f"cache file {crc}.cac is missing: not in {site.cache}" in mail.text
             assert f"copy {crc}.cac from the dockserver" in mail.text
             (site.cache / f"{crc}.cac").write_bytes(text)
             until(lambda: len(box.mails) == 2, "the pilot is told that it is over")
             until(lambda: Status.WAITING not in {f.status for f in site.files().values()}, "all is taken")
-    assert "ALL CLEAR cora: its dives can be judged again" in box.mails[1].subject
+    assert "cora ALL CLEAR: its dives can be judged again" in box.mails[1].subject
     assert len(box.mails) == 2 and TRACEBACK not in daemon.text()
 
 

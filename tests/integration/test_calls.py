@@ -166,7 +166,7 @@ class TestWithoutFile:
             ["electa CALLED and sent no file"],
             ["electa CALLS WITHOUT A FILE: 2 in a row"],
             [],
-            ["ALL CLEAR electa: it sends files again"],
+            ["electa ALL CLEAR: it sends files again"],
         ]
         assert [a.severity for alerts in made for a in alerts] == [0, 1, 0]
 
@@ -269,7 +269,7 @@ class TestAbortsThatGoOn:
         assert self.prompt(dock, T0 + 26 * HOUR) == []  # not within a day of the last message
         (again,) = self.prompt(dock, T0 + 49 * HOUR)
         assert again.kind is Kind.REMINDER and again.incident == first.incident
-        assert again.title == "REMINDER electa ABORTED: leak"
+        assert again.title == "electa STILL ABORTED: leak"
         ack = acknowledge_thread(first.incident, Severity.CRITICAL, "ann", "", T0 + 50 * HOUR)
         dock.store.notes.acknowledge("electa", ack)
         assert self.prompt(dock, T0 + 120 * HOUR) == []

@@ -8,6 +8,7 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from email.message import EmailMessage
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
@@ -305,19 +306,22 @@ class TestHttp:
         assert "041° true & <more>" in payload["message"]
         assert payload["type"] == "failure"
 
-    def test_slack_text_is_readable_and_escaped(self, slack: Hook) -> None:
+    def test_slack_gets_what_a_chat_shows_in_its_own_markup(self, slack: Hook) -> None:
         made = written.opened(incident(), SLOW, alert_id="a", audience=Severity.CRITICAL)
-        evil = alert(title=made.title + " <!channel> &", body=made.body + "<!here|x> <http://e.org|y> & *b*")
+        lead, rest = made.brief.split("\n", 1)
+        evil = replace(
+            made, title=made.title + " <!channel> &", brief=f"{lead} <!here|x> <http://e.org|y> & *b*\n{rest}"
+        )
         Channel("slack", SLACK).send(evil)
         ((path, payload),) = slack.posts
         assert path == "/services/T1JJ3T3L2/A1BRTD4JD/TIiajkdnlazkcOXrIdevi7FQ"
         (attachment,) = payload["attachments"]
+        text = attachment["text"]
         assert attachment["title"] == made.title + " &lt;!channel&gt; &amp;"
-        assert attachment["text"].startswith("electa flies at 0.11 m/s")
-        assert "https://www.openstreetmap.org/?mlat=24.20575&amp;mlon=" in attachment["text"]
-        assert "&lt;!here|x&gt; &lt;http://e.org|y&gt; &amp; *b*" in attachment["text"]
-        assert "<" not in attachment["text"]
-        assert payload["mrkdwn"] is False
+        assert text.startswith("electa is slow since") and "*What to do*" in text
+        assert "<https://www.openstreetmap.org/?mlat=24.20575&amp;mlon=" in text and "|Map>" in text
+        assert "<!" not in text and "<http://e.org" not in text
+        assert "In symbols" not in text and "Last speeds" not in text
 
     @pytest.mark.parametrize("code", [429, 500, 503, 404])
     def test_anything_but_success_is_a_failure(self, hook: Hook, code: int) -> None:

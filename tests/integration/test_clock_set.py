@@ -94,16 +94,16 @@ def test_a_clock_set_forward_by_hours_costs_no_dive(step):
 def test_the_operator_is_told_once(step, size, why):
     store, alerts = live(with_clock_set(MISSION, 15, step), CAME)
     (told,) = (a for a in alerts if a.kind == Kind.OPERATOR)
-    assert told.title == f"GLIDERWATCH: the clock of unit fell back by {size}"
+    assert told.title == f"unit CLOCK fell back by {size}"
     assert why in told.body and "put on the right time" in told.body
     assert store.clock_steps("unit")[0].segment == MISSION[15].id.name
 
 
 def test_that_it_is_right_again_is_told():
     _, alerts = live(with_clock_set(MISSION, 10, -10 * DAY, until=18), CAME)
-    assert [a.title.removeprefix("GLIDERWATCH: ") for a in alerts if a.kind == Kind.OPERATOR] == [
-        "the clock of unit fell back by 10 days",
-        "the clock of unit is right again",
+    assert [a.title for a in alerts if a.kind == Kind.OPERATOR] == [
+        "unit CLOCK fell back by 10 days",
+        "unit CLOCK right again",
     ]
 
 
@@ -123,7 +123,7 @@ class TestNotKnownByHowMuch:
     def test_its_dives_are_kept_apart_and_it_is_said(self):
         store, alerts = live(LOST, LOST_CAME)
         (told,) = (a for a in alerts if a.kind == Kind.OPERATOR)
-        assert told.title == "GLIDERWATCH: the clock of unit fell back, by how much is not known"
+        assert told.title == "unit CLOCK fell back, not known by how much"
         assert "kept apart" in told.body
         assert not any(a.flag for a in store.assessments("unit"))
 
@@ -157,7 +157,7 @@ def test_a_restart_with_a_wrong_clock_is_told_and_the_glider_has_called():
     ]
     store, alerts = live([*MISSION[:15], *again], CAME)
     (told,) = alerts
-    assert told.title == "GLIDERWATCH: files of unit are dated 7173 days before they came"
+    assert told.title == "unit OLD DATES: files are 7173 days old"
     assert "kept apart" in told.body and "unit-2004-100-0" in told.body
     assert not any(a.flag for a in store.assessments("unit"))
     assert transaction.next_tick(store, "unit", ALL, CAME[-1]) > CAME[-1] + 3 * HOUR

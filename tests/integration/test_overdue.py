@@ -115,8 +115,8 @@ def test_live_says_what_a_replay_says(fleet) -> None:
     assert [a.severity for a in told[:2]] == [Severity.WARNING, Severity.CRITICAL]
     before, after = of("angus", fleet)[gap(of("angus", fleet)) - 1 :][:2]
     assert before.last_t < told[0].time < told[-1].time <= after.last_t
-    assert "dockserver and modem first: the other glider is late as well" in told[0].body
-    assert "shore side" not in told[-2].title, "by then bruce calls"
+    assert "dockserver and modem first: the other glider is silent as well" in told[0].body
+    assert "dockserver" not in told[-2].title, "by then bruce calls"
 
 
 def test_a_replay_knows_when_each_message_would_have_come(fleet) -> None:
@@ -344,7 +344,7 @@ class TestQuiet:
             live.take(segment, live.now)
         live.speaking = replace(live.speaking, attention=lambda g: Attention(recovered=g == "bruce"))
         assert live.gliders == ["angus", "bruce"] and live.tick(due) == ["overdue"]
-        assert "no other glider at sea" in live.alerts[-1].body
+        assert "the only one at sea" in live.alerts[-1].body
 
     def test_hours_as_configured(self, fleet) -> None:
         live, _, due = silent(fleet, overdue_hours=0.5)

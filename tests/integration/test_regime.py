@@ -23,7 +23,7 @@ def test_a_faster_glider_is_a_notice_after_three_dives_and_no_alarm():
     alerts = told(mission([USUAL] * 8 + [FASTER] * 8))
     assert [a.kind for a in alerts] == [Kind.REGIME]
     notice = alerts[0]
-    assert notice.title.startswith("NEW NORMAL unit: flies faster, 0.4")
+    assert notice.title.startswith("unit NEW NORMAL: flies faster, 0.4")
     assert "unless you say otherwise" in notice.body
     assert (notice.severity, notice.audience, notice.incident) == (Severity.INFO, Severity.WARNING, "")
 

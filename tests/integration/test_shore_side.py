@@ -88,13 +88,13 @@ def test_one_message_for_four_gliders_and_one_all_clear(fleet: Fleet) -> None:
     said = shore.live(of(fleet, before=SILENT), BACK)
     assert {a.glider for a in said} == {said[0].glider}, kinds(said)
     assert [str(a.kind) for a in said] == ["overdue", *["reminder"] * (len(said) - 1)]
-    assert "as all 4 gliders: shore side?" in said[0].title
+    assert "all 4 silent: dockserver?" in said[0].title
     for name in set(NAMES) - {said[0].glider}:
         assert name in said[0].body
-    assert "told by itself if it still stays away" in said[0].body
+    assert "gets a message of its own" in said[0].body
     over = shore.live(of(fleet, after=BACK), BACK + 8 * HOUR)
     assert kinds(over) == [(said[0].glider, "all_clear")]
-    assert "told by itself" in over[0].body
+    assert "gets a message of its own" in over[0].body
 
 
 def test_a_glider_that_does_not_come_back_with_the_others_is_told_by_itself(fleet: Fleet) -> None:
@@ -104,7 +104,7 @@ def test_a_glider_that_does_not_come_back_with_the_others_is_told_by_itself(flee
     after = shore.live(of(fleet, after=BACK, without=lost), BACK + 10 * HOUR)
     told = [a for a in after if a.glider == lost]
     assert [str(a.kind) for a in told] == ["overdue"], kinds(after)
-    assert "shore side" not in told[0].title and "3 of 3 other gliders call" in told[0].body
+    assert "dockserver" not in told[0].title and "3 of 3 other gliders call" in told[0].body
     assert told[0].time < BACK + 8 * HOUR
 
 

@@ -120,7 +120,7 @@ def is_told_once_and_in_time(live: Live, files: Sequence[tuple[Path, float]]) ->
     assert began < first.time <= began + 27 * HOUR
     assert {a.kind for a in more} == {Kind.REMINDER} and 3 <= len(more) <= 4, "they thin out over ten days"
     assert [a for a in live.alerts if a.kind == Kind.OVERDUE] == []
-    assert first.title.startswith("CANNOT BE JUDGED angus: ")
+    assert first.title.startswith("angus CANNOT BE JUDGED for ")
     return first
 
 
@@ -139,7 +139,7 @@ def test_files_that_wait_for_a_cache(copied) -> None:
     assert len(live.store.files(Status.WAITING)) > 60
     first = is_told_once_and_in_time(live, files)
     assert f"cache file deadbeef.cac is missing: not in {folder / 'cache'}" in first.body
-    assert "copy deadbeef.cac from the dockserver" in first.body
+    assert "Copy deadbeef.cac from the dockserver" in first.body
 
 
 def test_files_that_are_all_quarantined(copied) -> None:
@@ -150,7 +150,7 @@ def test_files_that_are_all_quarantined(copied) -> None:
     assert len(live.store.files(Status.QUARANTINED)) > 60
     first = is_told_once_and_in_time(live, files)
     assert "files: damaged" in first.body
-    assert "copy the files from the glider or the dockserver again" in first.body
+    assert "Copy the files from the glider or the dockserver again" in first.body
 
 
 def test_files_in_which_there_is_nothing(copied) -> None:
@@ -188,7 +188,7 @@ def test_dives_that_come_and_have_no_flag(copied) -> None:
             live.store, found.file, segment, GliderParams(), live.speaking, at
         ).alerts
     first = is_told_once_and_in_time(live, files)
-    assert "gliderwatch doctor" in first.body or "add m_heading" in first.body
+    assert "gliderwatch doctor" in first.body or "dd m_heading" in first.body
 
 
 UNSEEN = (

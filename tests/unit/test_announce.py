@@ -191,11 +191,11 @@ class TestNotices:
         last = max(a.t_surface for a in world.dives.values())
         world.next = NextSurfacing(last + 60, last + 3 * 3600, 600.0, 27.5, -84.0, 1e4, 0.0, 1e4, "test")
         talk.hear(world)
-        assert "Next surfacing" in talk.alerts[-1].body and "084° 00.000' W" in talk.alerts[-1].body
+        assert "Next call: 1970" in talk.alerts[-1].body and "084° 00.000' W" in talk.alerts[-1].body
         world, talk = World.of("00"), Talk(notices=True)
         world.next = NextSurfacing(last - 7200, last, 600.0, 27.5, -84.0, 1e4, 0.0, 1e4, "of an earlier one")
         talk.hear(world)
-        assert "Next surfacing" not in talk.alerts[-1].body
+        assert "Next call: not known" in talk.alerts[-1].body
 
     def test_one_a_surfacing(self):
         talk = Talk(notices=True)

@@ -21,8 +21,10 @@ def places(*spots, step=3 * HOUR):
 
 def test_places_that_alternate_are_of_two_gliders():
     (told,) = found("unit", [], places(HERE, THERE, HERE, THERE, HERE, THERE))
-    title, text = irregularity_text.words(told)
-    assert title == "files of two gliders come under the name unit"
+    title, page = irregularity_text.irregular("", told)
+    assert title == "unit TWO GLIDERS under this name"
+    text = page.text()
+    assert "files of two gliders come under the name unit" in text
     assert "36" in text and "27" in text and "km apart within 3.0 h" in text
 
 

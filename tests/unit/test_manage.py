@@ -17,7 +17,13 @@ from rich.console import Console
 from alert_support import DISAGREE, SLOW, alert, incident
 from announcing import Talk, World
 from gliderwatch.cli import manage, tables
-from gliderwatch.cli.status import acknowledge_incident, incident_entries, overview, status_as_json
+from gliderwatch.cli.status import (
+    acknowledge_incident,
+    give_incident_back,
+    incident_entries,
+    overview,
+    status_as_json,
+)
 from gliderwatch.config import Config, load
 from gliderwatch.errors import GliderwatchError, StateError
 from gliderwatch.incidents.acknowledgement import acknowledge, with_mute
@@ -130,6 +136,21 @@ class TestAcknowledged:
         noted, is_new = acknowledge_incident(config, "electa/anomaly/1667639520", "bob", "mine now", NOW + 60)
         assert is_new
         assert incident_entries(config) == [noted]
+
+    def test_the_glider_is_enough_the_others_hear_of_it_and_it_can_be_undone(self, config: Config) -> None:
+        noted, is_new = acknowledge_incident(config, "electa", "ann", "on it", NOW)
+        assert is_new and noted.incident.id == "electa/anomaly/1667639520"
+        given = give_incident_back(config, "electa", "ann", "", NOW + 60)
+        assert given.ack is None and incident_entries(config) == [given]
+        with manage.reading(config) as store:
+            made = [a for a in store.alerts() if a.kind is Kind.ACKNOWLEDGED]
+        assert [a.title for a in made] == [
+            "electa ann is on it (anomaly)",
+            "electa given back by ann (anomaly)",
+        ]
+        assert {a.incident for a in made} == {noted.incident.id}
+        with pytest.raises(GliderwatchError, match="nothing to undo"):
+            give_incident_back(config, "electa", "ann", "", NOW + 90)
 
     @pytest.mark.parametrize("identity", ["electa/anomaly/7", "electa/anomaly/1", ""])
     def test_what_is_not_open_is_refused_with_what_is(self, config: Config, identity: str) -> None:

@@ -26,9 +26,8 @@ def test_two_surfacings_in_a_row_and_once():
     assert reported(SURE, CLEAR, SURE)[1] == []
     state, alerts = reported(SURE, SURE, SURE, SURE)
     assert [(a.kind, a.severity) for a in alerts] == [(Kind.NEIGHBOURS, Severity.CRITICAL)]
-    assert (
-        alerts[0].title == "DIFFERS FROM NEIGHBOURS a: makes 40 % less way through the water than it believes"
-    )
+    assert alerts[0].title == "a LOSES SPEED by 40 %, say its neighbours"
+    assert "makes 40 % less way through the water than it believes" in alerts[0].body
     assert "b, c" in alerts[0].body
     assert state.id == alerts[0].incident == f"a/neighbours/loss/{LOSS.since:.0f}"
 

@@ -16,7 +16,7 @@ from gliderwatch.incidents.unjudged import Unknown, announce, blindness
 from gliderwatch.messages.notice_text import render
 from gliderwatch.messages.template import escalated
 from gliderwatch.messages.unjudged_text import CURES
-from gliderwatch.model import Alert, Hindrance, Kind, NextSurfacing, Severity, Unusable
+from gliderwatch.model import Alert, Hindrance, Incident, Kind, NextSurfacing, Severity, Unusable
 from gliderwatch.params import Attention
 
 HOUR, DAY = 3600.0, 86400.0
@@ -47,6 +47,12 @@ class Sea:
 
     def expected(self, until: float) -> NextSurfacing | None:
         return NextSurfacing(T0, T0 + self.interval, 60.0, None, None, 0.0, 0.0, 0.0, "")
+
+    def last_surfacing(self, until: float) -> None:
+        return None
+
+    def incidents(self) -> tuple[Incident, ...]:
+        return ()
 
     def judged(self, until: float) -> float | None:
         return max((t for t in self.flagged if t <= until), default=None)
@@ -86,8 +92,9 @@ def test_each_cause_is_told_with_its_cure_once_and_clears(cause: Unusable | Hind
     (alert,) = talk.alerts
     assert alert.kind is Kind.UNKNOWN
     assert alert.severity == alert.audience == Severity.WARNING
-    assert "so it is" in alert.title and "Main reason: 7 " in alert.body
-    assert CURES[cause].format(cache="ab.cac") in alert.body
+    assert "CANNOT BE JUDGED" in alert.title and "so it is. " in alert.body
+    assert "Main reason: 7 " in alert.body
+    assert CURES[cause].format(cache="ab.cac")[1:] in alert.body
     assert talk.hear(10) == [Kind.ALL_CLEAR] and talk.hear(11) == []
     assert talk.alerts[-1].incident == alert.incident and talk.alerts[-1].audience == Severity.WARNING
     assert {a.id for a in talk.alerts} == {f"{alert.incident}/0", f"{alert.incident}/1"}
@@ -106,7 +113,7 @@ def test_the_most_frequent_reason_comes_first() -> None:
         )
     body = talk.alerts[0].body
     assert "Main reason: 4 files: no cache" in body and "- 3 dives: no heading" in body
-    assert body.index("copy ab.cac from") < body.index("add m_heading")
+    assert body.index("Copy ab.cac from") < body.index("Add m_heading")
 
 
 @pytest.mark.parametrize(("dives", "hours", "n"), [(8, None, 8), (3, 24.0, 3), (None, 12.0, 4), (8, 12.0, 4)])

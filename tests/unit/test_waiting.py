@@ -131,8 +131,8 @@ def test_an_escalated_message_says_why_it_comes_and_what_to_do() -> None:
     made = alert(incident="electa/anomaly/1667639520+", html="<body>\n<p style='x'>a</p>\n<p style='y'>b</p>")
     told = escalated(made, 1800.0)
     assert told.title == f"NOT ACKNOWLEDGED {made.title}"
-    lead = "Nobody has acknowledged this for 30 min: that is why you are told. "
-    lead += "If you take it on: gliderwatch ack electa/anomaly/1667639520"
+    lead = "Nobody has acknowledged this for 30 min: that is why it comes to you. "
+    lead += "To take it on: sudo -u gliderwatch gliderwatch ack electa/anomaly/1667639520"
     assert told.body == f"{lead}\n\n{made.body}"
     assert told.html == f"<body>\n<p><b>{lead}</b></p>\n<p style='x'>a</p>\n<p style='y'>b</p>"
     assert (told.id, told.incident) == (made.id, made.incident)
@@ -142,7 +142,7 @@ def test_a_mail_says_it_above_all_else() -> None:
     made = written.opened(incident(), SLOW, alert_id="a", audience=Severity.CRITICAL)
     told = escalated(replace(made, incident="electa/anomaly/1"), 60.0)
     place = told.html.index("Nobody has acknowledged this for 1 min")
-    assert told.html.index("<body") < place < told.html.index("<b>ANOMALY electa")
+    assert told.html.index("<body") < place < told.html.index("<b>electa SLOW")
 
 
 def test_a_silence_is_taken_on_by_a_mute() -> None:

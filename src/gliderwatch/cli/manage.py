@@ -196,23 +196,30 @@ def unmute(config_path: Path, glider: str) -> None:
     click.echo("\n".join(unmute_glider(load(config_path), glider, time.time())))
 
 
-@click.command(epilog=example("gliderwatch ack electa/anomaly/1667639520 --by Ann"))
+@click.command(epilog=example("gliderwatch ack electa --by Ann", "gliderwatch ack electa --undo"))
 @click.argument("incident")
 @click.option("--by", help="Who takes it on; else the user of this command.")
 @click.option("--note", default="", help="What the others should know.")
+@click.option("--undo", is_flag=True, help="Take the acknowledgement back.")
 @config_option
-def ack(config_path: Path, incident: str, by: str | None, note: str) -> None:
+def ack(config_path: Path, incident: str, by: str | None, note: str, undo: bool) -> None:
     """Acknowledge an incident: no reminders of it until it is over or grows worse.
 
-    INCIDENT is its id, as `gliderwatch incidents` shows it.
+    INCIDENT is a glider, where one incident of it is open, or an id, as `gliderwatch incidents` shows it.
+    All who hear of the incident are notified.
     """
     import getpass
 
     from gliderwatch.cli import tables
-    from gliderwatch.cli.status import acknowledge_incident
+    from gliderwatch.cli.status import acknowledge_incident, give_incident_back
     from gliderwatch.config import load
 
     who = by or os.environ.get("SUDO_USER") or getpass.getuser()
+    if undo:
+        noted = give_incident_back(load(config_path), incident, who, note, time.time())
+        click.echo("not acknowledged any more")
+        tables.incidents([noted], Console())
+        return
     noted, is_new = acknowledge_incident(load(config_path), incident, who, note, time.time())
     click.echo("acknowledged" if is_new else "was acknowledged already, nothing changed")
     tables.incidents([noted], Console())

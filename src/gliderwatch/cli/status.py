@@ -13,16 +13,17 @@ from gliderwatch.config import Config, linked_gliders
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.incidents.acknowledgement import Ack, Acks, acknowledge, acknowledge_thread, with_mute
 from gliderwatch.incidents.constants import GONE, RECENT
-from gliderwatch.incidents.notices import Irregularity
+from gliderwatch.incidents.notices import Acknowledged, Irregularity, Notice
 from gliderwatch.incidents.notifications import OpenThread, open_threads
 from gliderwatch.incidents.overdue import ExpectedCall, expected_call, guess, is_launched
 from gliderwatch.messages import irregularity_text
 from gliderwatch.messages.formatting import clean
-from gliderwatch.model import Assessment, Call, Incident, NextSurfacing
+from gliderwatch.messages.notice_text import render
+from gliderwatch.model import Assessment, Call, Incident, Kind, NextSurfacing, Severity
 from gliderwatch.params import Attention
 from gliderwatch.service.jsonl import assessment_line, iso
 from gliderwatch.service.liveness import STALE, is_held, seconds_silent
-from gliderwatch.service.routing import withdraw_answered
+from gliderwatch.service.routing import channels, post_alert, withdraw_answered
 from gliderwatch.slocum.folders import Link
 from gliderwatch.store.state_file import File, Status, Store, Undelivered
 
@@ -80,18 +81,16 @@ def _of(store: Store, glider: str, every: bool) -> list[IncidentEntry]:
 
 
 def acknowledge_incident(
-    config: Config, identity: str, by: str, note: str, now: float
+    config: Config, wanted: str, by: str, note: str, now: float
 ) -> tuple[IncidentEntry, bool]:
     """Take an open incident on; with it, and whether that is new: the same once more changes nothing.
 
-    Who waits for an acknowledgement is not told of it any more.
+    `wanted` is its id, or a glider of which one incident is open. Who waits for an acknowledgement is not
+    notified of the incident any more; who was is notified of who is on it.
     Raises GliderwatchError, naming those that are open, where it is none of them.
     """
     with writing(config) as store:
-        known = [noted for glider in store.gliders() for noted in _of(store, glider, every=True)]
-        noted = next((n for n in known if n.incident.id == identity.strip()), None)
-        if noted is None or not noted.is_open:
-            raise GliderwatchError(_refusal(identity, noted, known))
+        noted = _open_entry(store, wanted)
         before = noted.ack
         if noted.is_quiet and before is not None and (before.by, before.note) == (by, note):
             return noted, False
@@ -102,14 +101,66 @@ def acknowledge_incident(
             made = acknowledge(i, by, note, now)
         store.notes.acknowledge(noted.incident.glider, made)
         withdraw_answered(store, noted.incident.glider, now)
+        _notify_others(store, config, noted.incident, by, note, now, is_undone=False)
     return IncidentEntry(noted.incident, made), True
 
 
-def _refusal(identity: str, noted: IncidentEntry | None, known: list[IncidentEntry]) -> str:
-    wrong = "there is no incident" if noted is None else "there is nothing left to do: cleared is incident"
-    opened = [n.incident.id for n in known if n.is_open]
-    listed = "".join(f"\n  {clean(i)}" for i in opened) if opened else " none"
-    return f"{wrong} {clean(identity)}; open are:{listed}"
+def give_incident_back(config: Config, wanted: str, by: str, note: str, now: float) -> IncidentEntry:
+    """Take back the acknowledgement of an open incident, and notify the others.
+
+    Raises GliderwatchError where it is none that is open, or nobody has acknowledged it.
+    """
+    with writing(config) as store:
+        noted = _open_entry(store, wanted)
+        if noted.ack is None:
+            raise GliderwatchError(f"nobody has acknowledged {clean(noted.incident.id)}: nothing to undo")
+        store.notes.give_back(noted.incident.id)
+        _notify_others(store, config, noted.incident, by, note, now, is_undone=True)
+    return IncidentEntry(noted.incident, None)
+
+
+def _open_entry(store: Store, wanted: str) -> IncidentEntry:
+    """The open incident of an id, or the only one of a glider. Raises GliderwatchError."""
+    known = [noted for glider in store.gliders() for noted in _of(store, glider, every=True)]
+    wanted = wanted.strip()
+    found = [n for n in known if n.incident.glider == wanted.lower() and n.is_open]
+    if len(found) == 1:
+        return found[0]
+    noted = next((n for n in known if n.incident.id == wanted), None)
+    if noted is None or not noted.is_open:
+        raise GliderwatchError(_refusal(wanted, noted, known))
+    return noted
+
+
+def _notify_others(
+    store: Store,
+    config: Config,
+    incident: Incident | OpenThread,
+    by: str,
+    note: str,
+    now: float,
+    *,
+    is_undone: bool,
+) -> None:
+    """Put into the outbox that somebody is on an incident, or no more, for all who hear of it."""
+    content = Acknowledged(incident.id, incident.kind, incident.since, by, note, is_undone)
+    what, kind, info = "undone" if is_undone else "acknowledged", Kind.ACKNOWLEDGED, Severity.INFO
+    identity, glider = f"{incident.id}/{what}/{now:.3f}", incident.glider
+    alert = render(Notice(identity, incident.id, glider, now, kind, info, incident.severity, content))
+    post_alert(store, alert, channels(alert, config), now)
+
+
+def _refusal(wanted: str, noted: IncidentEntry | None, known: list[IncidentEntry]) -> str:
+    opened = [n.incident for n in known if n.is_open]
+    mine = [i for i in opened if i.glider == wanted.lower()]
+    if len(mine) > 1:
+        wrong = f"several incidents of {clean(wanted)} are open: name one by its id"
+    elif noted is not None:
+        wrong = f"there is nothing left to do: cleared is incident {clean(wanted)}"
+    else:
+        wrong = f"there is no incident {clean(wanted)}"
+    listed = "".join(f"\n  {clean(i.id)}" for i in mine or opened) if opened else " none"
+    return f"{wrong}; open are:{listed}"
 
 
 def incidents_as_json(noted: IncidentEntry) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from gliderwatch.delivery.mail import (
     reach,
     submit,
 )
+from gliderwatch.messages.template import chat_html
 from gliderwatch.model import Alert, Kind, Severity
 
 __all__ = ["Channel", "DeliveryError", "problem", "scrub"]
@@ -245,17 +246,23 @@ def _quiet() -> logging.Logger:
 
 
 def _notify(service: Any, alert: Alert) -> None:
-    """Send by Apprise. Text is declared as text, which Apprise escapes as each service needs it."""
+    """Send what a chat is to show by Apprise, which turns it into the markup of each service.
+
+    A service that prefers plain text gets that: Apprise escapes it as each service needs it.
+    """
     import apprise  # noqa: PLC0415
 
     one = apprise.Apprise()
     one.add(service)
+    brief, formats = alert.brief or alert.body, service.notify_format
+    prefers = formats if isinstance(formats, str) else formats[0]
+    is_text = prefers == apprise.NotifyFormat.TEXT
     try:
         result = one.notify(
-            body=_dead(alert.body),
+            body=_dead(brief) if is_text else _dead(chat_html(brief)),
             title=_dead(alert.title),
             notify_type=_notify_type(alert),
-            body_format=apprise.NotifyFormat.TEXT,
+            body_format=apprise.NotifyFormat.TEXT if is_text else apprise.NotifyFormat.HTML,
         )
     except Exception as error:  # a plugin may raise anything: all of it means not delivered
         raise DeliveryError(f"{service.service_name}: {type(error).__name__}") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 import time
 from collections import deque
@@ -363,13 +364,14 @@ def _report_of(row: OutboxRow, error: str, now: float) -> Alert:
         f"Channel {row.channel} refused for good: {error}\n"
         f"The message: {row.alert.title}\n"
         "It is not tried again there, nor are others that are refused so; `gliderwatch status` lists them. "
-        f"Correct the channel's URL, then try `gliderwatch test-alert --channel {row.channel}`."
+        f"\nWhat to do: correct the channel's URL, then try `gliderwatch test-alert --channel {row.channel}`."
     )
     return notice_text.operator(
         f"channel {row.channel} refuses messages",
         text,
         now,
         alert_id=f"{_REPORT}{row.channel}/{now // 86400:.0f}",
+        machine=socket.gethostname(),
         severity=Severity.WARNING,
         audience=Severity.WARNING,
     )

@@ -14,6 +14,7 @@ from urllib.parse import quote
 
 from gliderwatch.delivery.dispatcher import Sender
 from gliderwatch.errors import GliderwatchError
+from gliderwatch.messages.template import DO
 from gliderwatch.model import Alert, Kind
 
 # ruff: noqa: PLC0415
@@ -123,10 +124,15 @@ def linked(channels: dict[str, Sender], public: str, state: Path) -> dict[str, S
 
 
 def with_links(alert: Alert, links: tuple[tuple[str, str], ...]) -> Alert:
-    """A message that ends with links."""
+    """A message with links below what to do, before its numbers; one without that ends with them."""
     if not links:
         return alert
     lines = "\n".join(f"{label}: {url}" for label, url in links)
+    brief = f"{alert.brief.rstrip()}\n\n{lines}\n" if alert.brief else ""
+    rest = alert.body.removeprefix(alert.brief) if alert.brief else ""
     shown = "<br>\n".join(f'<a href="{escape(url)}">{escape(label)}</a>' for label, url in links)
-    html = alert.html.replace("</body>", f"<p>{shown}</p>\n</body>", 1)
-    return replace(alert, body=f"{alert.body.rstrip()}\n\n{lines}\n", html=html)
+    end = "</ul>" if f"<b>{DO}</b>" in alert.html else "</body>"
+    place = f"{end}\n<p>{shown}</p>" if end == "</ul>" else f"<p>{shown}</p>\n{end}"
+    html = alert.html.replace(end, place, 1)
+    body = f"{brief}{rest}" if brief and rest != alert.body else f"{alert.body.rstrip()}\n\n{lines}\n"
+    return replace(alert, body=body, html=html, brief=brief)

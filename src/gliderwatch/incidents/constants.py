@@ -19,6 +19,8 @@ NEWS = 86400.0
 """s: an incident that was over for longer when it became known is history, not news."""
 REGIME_DIVES = 8
 """Dives back among which a new way of flying is looked for, one that people do not know: a day of 3 h."""
+TREND_DIVES = 5
+"""Dives back whose speeds a message names: half a day to two days of flight."""
 NEIGHBOURS_IN_A_ROW = 2
 """Surfacings in a row at which the neighbours show a fault, or none, before that is reported."""
 NEIGHBOURS_AGAIN = 7 * 86400.0

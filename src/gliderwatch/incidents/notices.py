@@ -30,11 +30,30 @@ from gliderwatch.navigation.clock import ClockStep
 
 
 @dataclass(frozen=True, slots=True)
+class Situation:
+    """What a pilot asks beside what a notice is about.
+
+    ``last`` is the last dive that ended with a fix, ``speeds`` those of the last dives (m/s, None where not
+    known; oldest first), ``expected`` the next surfacing, ``others`` the other incidents that are open.
+    """
+
+    last: Assessment | None = None
+    speeds: tuple[float | None, ...] = ()
+    expected: NextSurfacing | None = None
+    others: tuple[Incident, ...] = ()
+
+
+NOTHING_ELSE = Situation()
+"""Where nothing else is known."""
+
+
+@dataclass(frozen=True, slots=True)
 class Opened:
     """An incident opened at the surfacing of a dive."""
 
     incident: Incident
     dive: Assessment
+    situation: Situation = NOTHING_ELSE
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,15 +63,16 @@ class StillOpen:
     incident: Incident
     dive: Assessment
     hours: float
+    situation: Situation = NOTHING_ELSE
 
 
 @dataclass(frozen=True, slots=True)
 class Cleared:
-    """An incident is over; ``dive`` cleared it, ``others`` are incidents that go on."""
+    """An incident is over; ``dive`` cleared it. The others of the ``situation`` go on."""
 
     incident: Incident
     dive: Assessment
-    others: tuple[Incident, ...] = ()
+    situation: Situation = NOTHING_ELSE
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +84,20 @@ class Corrected:
     now: Incident | None
     dive: Assessment
     why: str
+    situation: Situation = NOTHING_ELSE
+
+
+@dataclass(frozen=True, slots=True)
+class Acknowledged:
+    """Somebody (``by``) has taken on what goes on in a ``thread`` of a ``kind`` since ``since`` (s),
+    with a ``note``; ``is_undone``: has given it back."""
+
+    thread: str
+    kind: Kind
+    since: float
+    by: str
+    note: str
+    is_undone: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +120,7 @@ class NewRegime:
     dive: Assessment
     before: float
     since: float
+    situation: Situation = NOTHING_ELSE
 
 
 # -------------------------------------------------------------------- overdue
@@ -219,6 +254,7 @@ class Blind:
 
     found: Blindness
     first: bool
+    situation: Situation = NOTHING_ELSE
 
 
 @dataclass(frozen=True, slots=True)
@@ -387,6 +423,7 @@ Content = (
     | StillOpen
     | Cleared
     | Corrected
+    | Acknowledged
     | Surfaced
     | NewRegime
     | Overdue

@@ -15,12 +15,21 @@ from gliderwatch.incidents.calls import SEVERAL, Empty
 from gliderwatch.incidents.constants import FLOW_CHANGE, NEWS, REGIME_DIVES, SPEED_CHANGE
 from gliderwatch.incidents.health import HealthThread
 from gliderwatch.incidents.neighbours import Comparison
-from gliderwatch.incidents.notices import Cleared, Corrected, NewRegime, Notice, Opened, StillOpen, Surfaced
+from gliderwatch.incidents.notices import (
+    Cleared,
+    Corrected,
+    NewRegime,
+    Notice,
+    Opened,
+    StillOpen,
+    Surfaced,
+)
 from gliderwatch.incidents.overdue import Silence
 from gliderwatch.incidents.send_schedule import next_reminder
+from gliderwatch.incidents.situation import SituationFacts, next_surfacing, situation
 from gliderwatch.incidents.unjudged import Unknown
 from gliderwatch.layers.advice import LayerAdvice
-from gliderwatch.model import Assessment, Incident, Kind, NextSurfacing, Severity
+from gliderwatch.model import Assessment, Incident, Kind, Severity
 
 # ----------------------------------------
 # What people have been told, compared with what is known: the messages that are due. Pure.
@@ -69,20 +78,11 @@ class NotificationState:
     health: tuple[HealthThread, ...] = ()
 
 
-class IncidentFacts(Protocol):
+class IncidentFacts(SituationFacts, Protocol):
     """What is known of one glider now; the store answers."""
-
-    def incidents(self) -> tuple[Incident, ...]:
-        """All its incidents."""
 
     def dive(self, t_dive: float) -> Assessment | None:
         """The dive that began at a time (s)."""
-
-    def expected(self, until: float) -> NextSurfacing | None:
-        """What was expected after the last surfacing at `until` (s) or before."""
-
-    def last_surfacing(self, until: float) -> Assessment | None:
-        """The last dive that has ended with a fix and surfaced at `until` (s) or before."""
 
 
 def due_notifications(
@@ -126,10 +126,7 @@ def due_notifications(
         identity = f"{latest.glider}/surfacing/{latest.t_dive:.0f}"
         before_it = known.last_surfacing(latest.t_surface - 1.0)
         previous = before_it.t_surface if before_it is not None else None
-        expected = known.expected(float("inf"))
-        if expected is not None and expected.after < latest.t_surface:
-            expected = None  # of an earlier surfacing: the last dive cannot be used
-        content = Surfaced(latest, previous, expected, advice, layers)
+        content = Surfaced(latest, previous, next_surfacing(known, latest), advice, layers)
         info = Severity.INFO
         alerts.append(
             Notice(identity, "", latest.glider, latest.t_surface, Kind.SURFACING, info, info, content)
@@ -159,7 +156,7 @@ def _new_regime(
         if before is not None and dive.speed is not None and latest.t_surface - dive.t_surface < NEWS:
             since = dives[min(k + 2, len(dives) - 1)].t_dive
             identity = f"{dive.glider}/regime/{dive.t_dive:.0f}"
-            content, at = NewRegime(dive, before, since), dive.t_surface
+            content, at = NewRegime(dive, before, since, situation(known)), dive.t_surface
             severity, audience = Severity.INFO, Severity.WARNING
             notice = Notice(identity, "", dive.glider, at, Kind.REGIME, severity, audience, content)
             return dive.t_dive, [notice]
@@ -293,7 +290,8 @@ def _begun(
     while identity in taken:
         identity += "+"
     thread = Thread(identity, incident, incident.last, 0, latest.t_surface)
-    thread, alerts = _message(thread, Opened(incident, incident.last), latest)
+    content = Opened(incident, incident.last, situation(known, incident.id))
+    thread, alerts = _message(thread, content, latest)
     if incident.cleared_at is not None:
         thread, more = _message(thread, _cleared(incident, known), latest)
         alerts += more
@@ -303,8 +301,7 @@ def _begun(
 def _cleared(incident: Incident, known: IncidentFacts) -> Cleared:
     """That an incident is over, with the dive that cleared it and the incidents that go on."""
     dive = known.last_surfacing(incident.cleared_at if incident.cleared_at is not None else float("inf"))
-    others = tuple(i for i in known.incidents() if i.id != incident.id and i.cleared_at is None)
-    return Cleared(incident, dive if dive is not None else incident.last, others)
+    return Cleared(incident, dive if dive is not None else incident.last, situation(known, incident.id))
 
 
 def _continued(
@@ -319,7 +316,7 @@ def _continued(
     if now is None:
         if thread.withdrawn:
             return thread, []
-        content = Corrected(thread.told, None, dive, _why(thread, dive))
+        content = Corrected(thread.told, None, dive, _why(thread, dive), situation(known, thread.told.id))
         told, alerts = _message(thread, content, latest)
         return replace(told, withdrawn=True), alerts
     was_clear, is_clear = thread.told.cleared_at is not None, now.cleared_at is not None
@@ -327,12 +324,13 @@ def _continued(
         return _message(thread, _cleared(now, known), latest)
     moved = now.since != thread.told.since or now.cleared_at != thread.told.cleared_at
     if moved or thread.withdrawn or _changed(thread.dive, dive):
-        return _message(thread, Corrected(thread.told, now, dive, _why(thread, dive)), latest)
+        content = Corrected(thread.told, now, dive, _why(thread, dive), situation(known, now.id))
+        return _message(thread, content, latest)
     if not is_clear and reminder_hours is not None:
         before, age = ((t - now.opened_at) / 3600 / reminder_hours for t in (thread.time, latest.t_surface))
         if age >= next_reminder(before):
             hours = (latest.t_surface - now.since) / 3600
-            return _message(thread, StillOpen(now, latest, hours), latest)
+            return _message(thread, StillOpen(now, latest, hours, situation(known, now.id)), latest)
     return thread, []
 
 

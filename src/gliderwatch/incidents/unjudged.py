@@ -20,8 +20,9 @@ from gliderwatch.incidents.constants import (
     THINNED,
     UNJUDGED_INTERVALS,
 )
-from gliderwatch.incidents.notices import Blind, Blindness, JudgedAgain, Notice, Unjudged
+from gliderwatch.incidents.notices import Blind, Blindness, JudgedAgain, Notice, Situation, Unjudged
 from gliderwatch.incidents.overdue import HOUR, Sign, is_at_sea, rhythm
+from gliderwatch.incidents.situation import SituationFacts, situation
 from gliderwatch.model import Kind, NextSurfacing, Severity, Unusable
 from gliderwatch.navigation.constants import SHORTEST_DIVE
 from gliderwatch.params import Attention
@@ -42,13 +43,10 @@ class Unknown:
     is_over: bool = False
 
 
-class Known(Protocol):
+class Known(SituationFacts, Protocol):
     """What is known of one glider now; the store answers."""
 
     glider: str
-
-    def expected(self, until: float) -> NextSurfacing | None:
-        """What was expected after the last surfacing at `until` (s) or before."""
 
     def judged(self, until: float) -> float | None:
         """The last surfacing (s) at `until` (s) or before whose dive has a flag."""
@@ -126,7 +124,7 @@ def announce(
     """What people have been told after the messages that are due `now` (s), and these."""
     found = blindness(known, attention, now)
     if before is None or before.is_over:
-        return (before, []) if found is None else _begun(before, found)
+        return (before, []) if found is None else _begun(before, found, situation(known))
     at = known.judged(now)
     if at is not None and at > before.since and found is None:
         identity, content = f"{before.id}/{before.messages}", JudgedAgain(before.since, at)
@@ -138,18 +136,19 @@ def announce(
     pause = min(REMINDER_GROWTH ** (before.messages - 1), THINNED) * reminder_hours * HOUR
     if found.until - before.time < pause:
         return before, []
-    return _notified(before, found)
+    return _notified(before, found, situation(known))
 
 
-def _begun(before: Unknown | None, found: Blindness) -> tuple[Unknown, list[Notice]]:
+def _begun(before: Unknown | None, found: Blindness, now: Situation) -> tuple[Unknown, list[Notice]]:
     identity = f"{found.glider}/unknown/{found.since:.0f}"
     if before is not None and before.id.rstrip("+") == identity:
         identity = before.id + "+"
-    return _notified(Unknown(identity, found.since, 0, found.until), found)
+    return _notified(Unknown(identity, found.since, 0, found.until), found, now)
 
 
-def _notified(before: Unknown, found: Blindness) -> tuple[Unknown, list[Notice]]:
+def _notified(before: Unknown, found: Blindness, now: Situation) -> tuple[Unknown, list[Notice]]:
     first, loud = before.messages == 0, Severity.WARNING
     identity, kind = f"{before.id}/{before.messages}", Kind.UNKNOWN if first else Kind.REMINDER
-    notice = Notice(identity, before.id, found.glider, found.until, kind, loud, loud, Blind(found, first))
+    content = Blind(found, first, now)
+    notice = Notice(identity, before.id, found.glider, found.until, kind, loud, loud, content)
     return replace(before, messages=before.messages + 1, time=found.until), [notice]

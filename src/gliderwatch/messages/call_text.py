@@ -1,6 +1,6 @@
 """What people read when a glider tells in a call that something is wrong, or calls and sends nothing. Pure.
 
-The same form as `messages.incident_text`: what and how bad, since when, where, what to check.
+The same form as `messages.incident_text`: what, since when, how sure; where; next call; what to do.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from gliderwatch.incidents.notices import (
     SendsAgain,
     StillAborted,
 )
-from gliderwatch.messages.formatting import clean, duration, map_link, place, utc
-from gliderwatch.messages.template import Page, Text
+from gliderwatch.messages.formatting import clean, duration, place, short_place, utc
+from gliderwatch.messages.lines import Pairs, map_of, name_of, take_on_thread
+from gliderwatch.messages.template import Page, Text, titled
 from gliderwatch.model import Call, Happening
 
 CAUSES = {
@@ -62,56 +63,105 @@ _WORDS = {
 
 def aborted(glider: str, content: Aborted) -> Text:
     """The glider reported in a call that something is wrong."""
-    main, name = content.reports[0], clean(glider, 40)
+    main, name, call = content.reports[0], name_of(glider), content.call
+    sure = "Not sure that it still matters: an old one" if main.is_history else "Sure (100 %): it said so"
+    others = "".join(f" Also: {_sentence(one)}." for one in content.reports[1:])
+    since = "" if main.what is Happening.ABORTING else f", since {utc(main.t)}"
+    first = f"{name}: {_sentence(main)}{since}. {sure}.{others}"
     page = Page(
-        tuple(f"{name}: {_sentence(one)}." for one in content.reports),
-        (("Since", utc(main.t)), *_facts(content.call)),
-        (("Check", _checks(content.reports)),),
+        (first, _where(call), _next(call)),
+        _facts(call),
+        do=_checks(content.reports),
+        links=(*_map(call), *take_on_thread(glider)),
     )
-    return f"{name} {_title(main)}", page
+    return titled(glider, _title(main)), page
 
 
 def still_aborted(glider: str, content: StillAborted) -> Text:
-    """The glider still flies no mission of its pilots."""
-    main, name = content.reports[0], clean(glider, 40)
+    """The glider still flies no mission of its pilots: five lines."""
+    main, name, call = content.reports[0], name_of(glider), content.call
     since = duration(3600 * content.hours)
+    (label, take), *_ = take_on_thread(glider)
     page = Page(
-        (f"{name}: for {since} now it flies no mission of yours.", f"It reported: {_sentence(main)}."),
-        (("Since", utc(main.t)), *_facts(content.call)),
-        (("Check", _checks(content.reports)),),
+        (
+            f"{name}: for {since} now it flies no mission of yours, since {utc(main.t)}.",
+            f"As bad as before: {_sentence(main)}.",
+            _where(call),
+            _next(call),
+            f"{label}, if nobody has: {take}",
+        )
     )
-    return f"REMINDER {name} {_title(main)}", page
+    return titled(glider, f"STILL {_title(main)}"), page
 
 
 def resumed(glider: str, content: Resumed) -> Text:
     """The glider flies a mission of its pilots again."""
-    name, mission = clean(glider, 40), clean(content.call.mission, 40)
-    page = Page((f"{name} is in its mission again: {mission}.",), _facts(content.call))
-    return f"ALL CLEAR {name}: in its mission again ({mission})", page
+    name, mission, call = name_of(glider), clean(content.call.mission, 40), content.call
+    page = Page(
+        (f"{name} is in its mission again: {mission}.", _where(call), _next(call)),
+        _facts(call),
+        do=("Nothing, if the cause of the abort is mended.",),
+        links=_map(call),
+    )
+    return titled(glider, "ALL CLEAR: in its mission again", f" ({mission})"), page
 
 
 def without_file(glider: str, content: CalledWithoutFile) -> Text:
     """The glider called and sent no file, once or several times in a row."""
     calls = content.calls
-    name, last, n = clean(glider, 40), calls[-1], len(calls)
+    name, last, n = name_of(glider), calls[-1], len(calls)
+    since = f"since {utc(calls[0].began)}"
     if n == 1:
-        title, lead = f"{name} CALLED and sent no file", f"{name} called and sent no file. It lives."
+        title, first = "CALLED and sent no file", f"{name} called and sent no file, {since}. It lives."
+        first += " Not sure that it is more than a cut connection (1 call)."
     else:
-        title = f"{name} CALLS WITHOUT A FILE: {n} in a row"
-        lead = f"{name} called {n} times in a row and sent no file. It lives, but is not watched."
+        title, first = f"CALLS WITHOUT A FILE: {n} in a row", f"{name} called {n} times in a row and sent no "
+        first += f"file, {since}: sure ({n} of {n} calls). It lives, but is not watched."
     cut = tuple(f"the transfer of {clean(file, 40)} was cut" for file in _cut(calls))
-    facts = (("Since", utc(calls[0].began)), ("Last call", f"{utc(last.began)} to {utc(last.last_t)}"))
-    check = ("does the login script send files?", "the quality of the connection; the other number")
-    lists = (*((("Cut", cut),) if cut else ()), ("Check", check))
-    return title, Page((lead,), (*facts, *_facts(last)), lists)
+    page = Page(
+        (first, _where(last), _next(last)),
+        (("Last call", f"{utc(last.began)} to {utc(last.last_t)}"), *_facts(last)),
+        ((("Cut", cut),) if cut else ()),
+        (
+            "The transfer was cut: look at the connection, try the other number."
+            if cut
+            else "See whether the login script sends files.",
+            "Ask it for its files in the next call.",
+        ),
+        (*_map(last), *take_on_thread(glider)),
+    )
+    return titled(glider, title), page
 
 
 def sends_again(glider: str, content: SendsAgain) -> Text:
     """The glider sent a file, after several calls without."""
-    name = clean(glider, 40)
-    return f"ALL CLEAR {name}: it sends files again", Page(
-        (f"{name} sends files again.",), _facts(content.call)
+    call = content.call
+    page = Page(
+        (f"{name_of(glider)} sends files again.", _where(call), _next(call)),
+        _facts(call),
+        do=("Nothing; its dives are judged as its files come.",),
+        links=_map(call),
     )
+    return titled(glider, "ALL CLEAR: it sends files again"), page
+
+
+def _where(call: Call) -> str:
+    if call.fix is None:
+        return f"Place not known; at the surface {utc(call.last_t)}, it drifts."
+    spot = short_place(call.fix.lat, call.fix.lon)
+    return f"At {spot}, {utc(call.fix.t)}; at the surface it drifts with wind and current."
+
+
+def _next(call: Call) -> str:
+    if not call.over:
+        return f"Next call: it is on the line now (last line {utc(call.last_t)})."
+    if call.calls_back:
+        return f"Next call: soon, it said so when it hung up {utc(call.last_t)}."
+    return f"Next call: not known; it hung up {utc(call.last_t)}."
+
+
+def _map(call: Call) -> Pairs:
+    return () if call.fix is None else map_of(call.fix.lat, call.fix.lon)
 
 
 def _title(report: AbortReport) -> str:
@@ -132,27 +182,23 @@ def _cause(cause: str) -> str:
 
 def _checks(reports: Iterable[AbortReport]) -> tuple[str, ...]:
     causes = {one.cause for one in reports}
-    leak = ("leak detectors and vacuum: plot the last values before you believe them",)
+    leak = ("Plot leak detectors and vacuum before you believe them; then plan the recovery.",)
     return (
+        "Go to the terminal, if no pilot is there: it waits at the surface and drifts.",
         *(leak if causes & {"LEAK", "VACUUM"} else ()),
-        "the log of the call, and that of the mission (mlg)",
-        "is a pilot in the terminal? It waits at the surface and drifts",
+        "Read the log of the call, and that of the mission (mlg).",
     )
 
 
-def _facts(call: Call) -> tuple[tuple[str, str], ...]:
+def _facts(call: Call) -> Pairs:
     """Where the glider is, and what it said of itself."""
     fix = call.fix
     lat, lon = (None, None) if fix is None else (fix.lat, fix.lon)
-    link = map_link(lat, lon)
+    segment = f", segment {clean(call.segment, 60)}" if call.segment else ""
+    mission = f"{clean(call.mission, 40)}{segment}"
     return (
         ("Where", place(lat, lon)),
-        *((("Map", link),) if link else ()),
-        *(
-            (("Mission", f"{clean(call.mission, 40)}, segment {clean(call.segment, 60)}"),)
-            if call.mission
-            else ()
-        ),
+        *((("Mission", mission),) if call.mission else ()),
         *((("At the surface because", clean(call.reason, 80)),) if call.reason else ()),
         ("Log", clean(call.log, 100)),
     )

@@ -87,6 +87,15 @@ def place(lat: float | None, lon: float | None) -> str:
     return f"{north}, {east} ({lat:.5f}, {lon:.5f})"
 
 
+def short_place(lat: float | None, lon: float | None) -> str:
+    """A position in degrees and decimal minutes alone.
+
+    >>> short_place(24.20575, -83.0205667)
+    "24° 12.345' N, 083° 01.234' W"
+    """
+    return place(lat, lon).partition(" (")[0]
+
+
 def _minutes(angle: float, positive: str, negative: str, width: int) -> str:
     # thousandths of a minute as an integer, so that 59.9996' becomes the next degree and not 60.000'
     whole, rest = divmod(round(abs(angle) * 60_000), 60_000)

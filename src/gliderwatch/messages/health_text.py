@@ -14,8 +14,9 @@ from gliderwatch.health.constants import ATMOSPHERE, COOL, FULL, INHG
 from gliderwatch.health.rule import Finding
 from gliderwatch.health.rules import RULES
 from gliderwatch.incidents.notices import HealthFound, HealthIncident, HealthOver, HealthReminder
-from gliderwatch.messages.formatting import clean, duration, map_link, place, utc
-from gliderwatch.messages.template import Page, Text
+from gliderwatch.messages.formatting import clean, duration, short_place, utc
+from gliderwatch.messages.lines import map_of, name_of, take_on_thread
+from gliderwatch.messages.template import Page, Text, sentence, titled
 from gliderwatch.model import Fix
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
@@ -68,48 +69,65 @@ _SHOWN = {
 
 def found(glider: str, content: HealthFound) -> Text:
     """A rule found something, or something worse than before."""
-    incident, name = content.incident, clean(glider, 40)
+    incident, name = content.incident, name_of(glider)
     finding = incident.worst if content.is_worse else incident.last
-    again = "is worse now: " if content.is_worse else ""
-    lead = f"{name}: {again}{finding.text}."
-    return f"{name} {_title(incident)}: {finding.text}", _page(lead, incident, finding, content.fix)
+    again = "is worse now, " if content.is_worse else ""
+    first = f"{name}: {again}{finding.text}, since {utc(incident.since)}."
+    short = finding.text.partition(",")[0]
+    return titled(glider, _title(incident), f": {short}"), _page(
+        first, glider, incident, finding, content.fix
+    )
 
 
 def reminder(glider: str, content: HealthReminder) -> Text:
-    """It is still so."""
-    incident, name = content.incident, clean(glider, 40)
+    """It is still so: five lines."""
+    incident, name = content.incident, name_of(glider)
     since = duration(3600 * content.hours)
-    lead = f"{name}: for {since} now: {incident.last.text}. Nobody has acknowledged it."
-    title = f"REMINDER {name} {_title(incident)}: for {since}"
-    return title, _page(lead, incident, incident.last, content.fix)
+    (label, take), *_ = take_on_thread(glider)
+    last = plot(incident.last) if incident.last.last else "no values"
+    page = Page(
+        (
+            f"{name}: for {since} now: {incident.last.text}.",
+            f"Since {utc(incident.since)}; last: {last}.",
+            _where(content.fix),
+            f"{label}, if nobody has: {take}",
+        )
+    )
+    return titled(glider, f"STILL {_title(incident)}", f" after {since}"), page
 
 
 def over(glider: str, content: HealthOver) -> Text:
     """It is over, or data that came late have shown that it was never so."""
-    incident, name = content.incident, clean(glider, 40)
+    incident, name = content.incident, name_of(glider)
     what = "was not so: data that came late show it" if content.is_withdrawn else "is over"
-    lead = f"{name}: {_title(incident).lower()} {what}. It was reported: {incident.last.text}."
-    title = f"ALL CLEAR {name}: {_title(incident).lower()} {what}"
-    return title, _page(lead, incident, incident.last, content.fix)
+    title = _title(incident).lower()
+    first = f"{name}: {title} {what}. It was reported {utc(incident.since)}: {incident.last.text}."
+    page = Page((first, _where(content.fix)), _numbers(incident, incident.last), do=("Nothing.",))
+    short = "was not so" if content.is_withdrawn else "is over"
+    return titled(glider, f"ALL CLEAR: {title} {short}"), page
 
 
 def _title(incident: HealthIncident) -> str:
     return incident.rule.replace("_", " ").upper()
 
 
-def _page(lead: str, incident: HealthIncident, finding: Finding, fix: Fix | None) -> Page:
+def _where(fix: Fix | None) -> str:
+    return "Place not known." if fix is None else f"Last at {short_place(fix.lat, fix.lon)}, {utc(fix.t)}."
+
+
+def _numbers(incident: HealthIncident, finding: Finding) -> tuple[tuple[str, str], ...]:
     about = next((rule.about for rule in RULES if rule.name == incident.rule), "")
-    lat, lon = (None, None) if fix is None else (fix.lat, fix.lon)
-    link = map_link(lat, lon)
-    facts = (
-        ("Since", utc(incident.since)),
+    return (
         *((("Last values", plot(finding)),) if finding.last else ()),
         ("Rule", f"{about} Its limits: `health.{incident.rule}` in the configuration"),
-        ("Where", place(lat, lon)),
-        *((("Map", link),) if link else ()),
     )
-    checks = ("plot more of these values before you believe it", *_CHECKS.get(incident.rule, ()))
-    return Page((lead,), facts, (("Check", checks),))
+
+
+def _page(first: str, glider: str, incident: HealthIncident, finding: Finding, fix: Fix | None) -> Page:
+    checks = tuple(sentence(f"{line}.") for line in _CHECKS.get(incident.rule, ()))
+    todo = ("Plot more of these values before you believe it.", *checks)
+    links = (*(() if fix is None else map_of(fix.lat, fix.lon)), *take_on_thread(glider))
+    return Page((first, _where(fix)), _numbers(incident, finding), do=todo[:3], links=links)
 
 
 def plot(finding: Finding) -> str:

@@ -1,8 +1,8 @@
-"""What people read: one structure of facts, rendered as title, text and HTML. Pure.
+"""What people read of incidents, surfacings and new ways of flying. Pure.
 
-Written for a pilot with a phone at 3 am: the first line says what and how bad, then since when,
-where, the numbers, what speaks for and against, what to check. Names and notes come from files, so
-each is made one printable line (`formatting.clean`).
+Written for a pilot with a phone at 3 am: three lines that stand alone (what, since when, how sure, why;
+where; next call), what to do, links, and only then numbers. Names and notes come from files, so each is made
+one printable line (`formatting.clean`).
 """
 
 from __future__ import annotations
@@ -10,138 +10,204 @@ from __future__ import annotations
 from math import degrees
 
 from gliderwatch.fleet.advice import Advice
-from gliderwatch.incidents.notices import Cleared, Corrected, NewRegime, Opened, StillOpen, Surfaced
-from gliderwatch.layers.advice import LayerAdvice
-from gliderwatch.messages.evidence import checks, difference, how_sure, out_of_range, weigh
-from gliderwatch.messages.formatting import (
-    INCIDENTS,
-    UNKNOWN,
-    clean,
-    duration,
-    flow,
-    known,
-    map_link,
-    place,
-    speed,
-    utc,
+from gliderwatch.incidents.notices import (
+    Acknowledged,
+    Cleared,
+    Corrected,
+    NewRegime,
+    Opened,
+    Situation,
+    StillOpen,
+    Surfaced,
 )
-from gliderwatch.messages.template import Page, Text
+from gliderwatch.layers.advice import LayerAdvice
+from gliderwatch.messages.causes import Likely, likeliest
+from gliderwatch.messages.evidence import (
+    certainty,
+    data_quality,
+    normal_range,
+    number,
+    out_of_range,
+    symbols,
+    weigh,
+)
+from gliderwatch.messages.formatting import INCIDENTS, clean, duration, known, place, utc
+from gliderwatch.messages.lines import (
+    dive_numbers,
+    exact_speed,
+    map_of,
+    name_of,
+    next_call,
+    speed_and_range,
+    take_on,
+    trend,
+    where,
+)
+from gliderwatch.messages.template import Page, Text, command, titled
 from gliderwatch.model import Assessment, Flag, Incident, Kind
 
-TITLES = {Kind.ANOMALY: "ANOMALY", Kind.FALSE_ALARM: "MEASUREMENTS DISAGREE"}
+SLOWER = 0.01
+"""m/s: speeds that differ by less are as bad as each other."""
 
 
 def opened(glider: str, content: Opened) -> Text:
     """The first message of an incident."""
-    incident, dive = content.incident, content.dive
+    incident, dive, now = content.incident, content.dive, content.situation
+    likely = likeliest(incident.kind, dive)
+    is_disagreement = incident.kind is Kind.FALSE_ALARM
     page = Page(
-        (_headline(incident.kind, dive),),
-        (_since(incident), *_facts(dive, incident.dives)),
-        (*_weighed(incident.kind, dive), ("Check", checks(incident, dive))),
+        (
+            _headline(incident, dive, likely),
+            where(dive, is_flow_sure=not is_disagreement),
+            next_call(now.expected),
+        ),
+        dive_numbers(dive, now),
+        _weighed(incident, dive, likely),
+        likely.cause.do,
+        (*map_of(dive.lat, dive.lon), *take_on(incident, now)),
+        data_quality(dive),
+        symbols(dive),
     )
-    doubt = "do not trust its speed, " if incident.kind is Kind.FALSE_ALARM else ""
-    return f"{TITLES[incident.kind]} {clean(glider, 40)}: {doubt}{_against_range(dive)}", page
+    return _title(glider, incident, dive, likely), page
 
 
 def still_open(glider: str, content: StillOpen) -> Text:
-    """The reminder of an incident."""
-    incident, latest = content.incident, content.dive
-    age = duration(content.hours * 3600)
-    lead = f"{clean(glider, 40)}: the {_name(incident)} is still open after {age}. "
-    lead += f"Latest dive: {flag_words(latest)}."
-    flagged = latest.flag == (Flag.FALSE_ALARM if incident.kind is Kind.FALSE_ALARM else Flag.ANOMALY)
+    """The reminder of an incident: five lines."""
+    incident, latest, now = content.incident, content.dive, content.situation
+    age, name = duration(content.hours * 3600), name_of(glider)
+    (label, take), *_ = take_on(incident, now)
     page = Page(
-        (lead, _headline(incident.kind, latest)) if flagged else (lead,),
-        (_since(incident), ("Worst", _worst(incident)), *_facts(latest, incident.dives)),
-        (*_weighed(incident.kind, latest), ("Check", checks(incident, latest))),
+        (
+            f"{name}: the {_name(incident)} since {utc(incident.since)} is still open, after {age}.",
+            _course(incident, latest, now),
+            where(now.last or latest, is_flow_sure=incident.kind is not Kind.FALSE_ALARM),
+            next_call(now.expected),
+            f"{label}, if nobody has: {take}",
+        )
     )
-    return f"REMINDER {clean(glider, 40)}: {_name(incident)} for {age}, {_against_range(latest)}", page
+    return titled(glider, f"STILL {_word(incident, latest)} after {age}", f": {exact_speed(latest)}"), page
+
+
+def _course(incident: Incident, latest: Assessment, now: Situation) -> str:
+    """Whether it grows better or worse."""
+    last = f"; last speeds {trend(now)}" if trend(now) else ""
+    if incident.kind is Kind.FALSE_ALARM or latest.flag is None:
+        return f"Latest dive: {flag_words(latest, short=True)}{last}."
+    value, worst = known(latest.speed), known(incident.worst.speed)
+    if value is None or worst is None:
+        how = "Not known whether better or worse"
+    elif not out_of_range(latest, value):
+        how = "Better: in its range, not yet near its usual speed"
+    elif abs(value - worst) <= SLOWER:
+        how = "As bad as ever"
+    else:
+        how = f"Better than its worst, {exact_speed(incident.worst)}"
+    return f"{how}: {speed_and_range(latest)}{last}."
 
 
 def cleared(glider: str, content: Cleared) -> Text:
     """The all-clear of an incident, which says what goes on."""
-    incident, dive, others = content.incident, content.dive, content.others
+    incident, dive, others = content.incident, content.dive, content.situation.others
+    name, over = name_of(glider), _name(incident)
     end = dive.t_surface if incident.cleared_at is None else incident.cleared_at
     still = " and ".join(f"the {_name(other)} since {utc(other.since)}" for other in others)
+    lasted = f"It lasted {duration(end - incident.since)}, since {utc(incident.since)}."
     if still:
-        lead = f"{clean(glider, 40)}: the {_name(incident)} is over, but not all is well: "
-        lead += f"{still} is still open. Latest dive: {flag_words(dive)}."
-        title = f"ALL CLEAR {clean(glider, 40)}: {_name(incident)} over, {_name(others[0])} still open"
-    elif incident.kind is Kind.FALSE_ALARM:
-        lead = f"{clean(glider, 40)}: the measurements agree again, {_against_range(dive)}. "
-        lead += f"The {_name(incident)} is over."
-        title = f"ALL CLEAR {clean(glider, 40)}: measurements agree, {_against_range(dive)}"
+        first = f"{name}: the {over} is over, but not all is well: {still} is still open. {lasted}"
+        title = titled(glider, f"{_name(others[0])} STILL OPEN", f", {over} over")
     else:
-        lead = f"{clean(glider, 40)} is normal again: {_against_range(dive)}. "
-        lead += f"The {_name(incident)} is over."
-        title = f"ALL CLEAR {clean(glider, 40)}: {_against_range(dive)}"
-    facts = (
-        _since(incident),
-        ("Lasted", f"{duration(end - incident.since)}, cleared {utc(end)}"),
-        ("Worst", _worst(incident)),
-        *_facts(dive, 0),
+        state = (
+            "the measurements agree again" if incident.kind is Kind.FALSE_ALARM else "flies as usual again"
+        )
+        first = f"{name}: {state}, {speed_and_range(dive)}. The {over} is over. {lasted}"
+        title = titled(glider, f"ALL CLEAR: {speed_and_range(dive)}")
+    todo = "Go on with what is still open." if still else "Nothing. Find out why, before you rely on it."
+    page = Page(
+        (first, where(dive), next_call(content.situation.expected)),
+        (("Worst", _worst(incident)), *dive_numbers(dive, content.situation)),
+        do=(todo,),
+        links=map_of(dive.lat, dive.lon),
     )
-    return title, Page((lead,), facts)
+    return title, page
 
 
 def corrected(glider: str, content: Corrected) -> Text:
     """Data that came later changed what was reported."""
-    before, now, dive = content.before, content.now, content.dive
-    lead = f"Correction for {clean(glider, 40)}: {clean(content.why)}. "
-    lead += f"The {_name(before)} {'is withdrawn' if now is None else 'stands'}. "
-    lead += f"The dive as assessed now: {flag_words(dive)}."
+    before, now, dive, situation = content.before, content.now, content.dive, content.situation
+    verdict = "is withdrawn" if now is None else "stands, with other numbers"
+    first = f"{name_of(glider)}: the {_name(before)} since {utc(before.since)} {verdict}, "
+    first += f"because {clean(content.why)}. That dive now: {flag_words(dive)}, {speed_and_range(dive)}."
+    todo = "Stop what you began because of it." if now is None else "Go on; read the numbers again."
+    still = "".join(f" Still open: {_name(other)}." for other in situation.others)
     page = Page(
-        (lead,),
+        (f"{first}{still}", where(situation.last or dive), next_call(situation.expected)),
         (
-            ("Told before", _summary(before)),
-            ("Known now", "no incident" if now is None else _summary(now)),
-            *_facts(dive, 0 if now is None else now.dives),
+            ("Reported before", _summary(before)),
+            ("So it is now", "no incident" if now is None else _summary(now)),
+            *dive_numbers(dive, situation),
         ),
-        () if now is None else _weighed(before.kind, dive),
+        () if now is None else _weighed(now, dive, likeliest(now.kind, dive)),
+        (todo,),
+        (*map_of(dive.lat, dive.lon), *(() if now is None else take_on(now, situation))),
     )
-    verdict = "withdrawn" if now is None else "stands"
-    return f"CORRECTION {clean(glider, 40)}: {_name(before)} {verdict}, {_against_range(dive)}", page
+    what = "withdrawn" if now is None else "stands"
+    return titled(glider, f"CORRECTION: {_name(before)} {what}", f", {exact_speed(dive)}"), page
+
+
+def acknowledged(glider: str, content: Acknowledged) -> Text:
+    """Somebody has taken an incident on, or given it back: for the others."""
+    who, what = clean(content.by, 40), INCIDENTS.get(content.kind, str(content.kind))
+    note = f": {clean(content.note)}" if content.note else ""
+    about = f"the {what} of {name_of(glider)} since {utc(content.since)}"
+    if content.is_undone:
+        first, done = f"{who} has given back {about}{note}. Nobody is on it.", f"given back by {who}"
+        links: tuple[tuple[str, str], ...] = (("Take it on", command(f"ack {content.thread}")),)
+    else:
+        first, done = f"{who} has taken on {about}{note}.", f"{who} is on it"
+        links = (("To undo it", command(f"ack {content.thread} --undo")),)
+    return titled(glider, done, f" ({what})"), Page((first,), links=links)
 
 
 def surfaced(glider: str, content: Surfaced) -> Text:
-    """The notice of one surfacing."""
-    a, previous, expected = content.dive, content.previous, content.expected
-    after: tuple[tuple[str, str], ...] = ()
-    if previous is not None:
-        after = (("After the one before", duration(a.t_surface - previous)),)
-    if expected is not None:
-        when = f"{utc(expected.t)}, within {duration(1.96 * expected.t_sigma)} (95 %)"
-        after += (("Next surfacing", f"{when}, {place(expected.lat, expected.lon)}"),)
-    after += tuple((f"Look next for {clean(name, 64)}", _advice(each)) for name, each in content.advice)
-    if content.layers is not None:
-        after += (("Fly next", _band(content.layers, a.t_dive)),)
+    """The notice of one surfacing: four lines."""
+    a, previous = content.dive, content.previous
+    after = "" if previous is None else f", {duration(a.t_surface - previous)} after the one before"
     page = Page(
-        (f"{clean(glider, 40)} surfaced {utc(a.t_surface)}: {flag_words(a)}.",),
-        (*after, *_facts(a, 0)),
-        (("Data", tuple(clean(note) for note in a.notes)),) if a.notes else (),
+        (
+            f"{name_of(glider)} surfaced {utc(a.t_surface)}{after}.",
+            f"{speed_and_range(a)}: {flag_words(a)}." + (" Nothing to do." if a.flag == Flag.NORMAL else ""),
+            where(a),
+            next_call(content.expected),
+        ),
+        (
+            *((f"Look next for {clean(name, 64)}", _advice(each)) for name, each in content.advice),
+            *((("Fly next", _band(content.layers, a.t_dive)),) if content.layers is not None else ()),
+        ),
     )
-    return f"SURFACED {clean(glider, 40)} {utc(a.t_surface)}: {_speed(a)}, {flag_words(a, short=True)}", page
+    when = utc(a.t_surface)[11:]
+    return titled(glider, f"surfaced {when}: {exact_speed(a)}", f", {flag_words(a, short=True)}"), page
 
 
 def new_regime(glider: str, content: NewRegime) -> Text:
     """The glider is flown in a new way."""
-    a, before, name = content.dive, content.before, clean(glider, 40)
+    a, before, now = content.dive, content.before, content.situation
     assert a.speed is not None
     what = "faster" if a.speed > before else "slower"
-    normal = f"{a.speed_min:.2f} to {a.speed_max:.2f} m/s"
-    why = "A thruster, ballast or pitch does that" if what == "faster" else "Pitch or ballast changed as well"
-    since = utc(content.since)
-    lead = f"{name} flies {what} since {since}: {a.speed:.2f} m/s, {before:.2f} m/s before."
-    check = (
-        f"{why}; if it was not you, see what is wrong.",
-        "To say otherwise, set normal_speed for this glider in the configuration.",
+    why = "thruster, ballast or pitch" if what == "faster" else "pitch or ballast"
+    first = (
+        f"{name_of(glider)} flies {what} since {utc(content.since)}: {a.speed:.2f} m/s, {before:.2f} before. "
     )
+    first += f"Likely {why}: three dives agree. New {normal_range(a)} m/s, unless you say otherwise."
     page = Page(
-        (lead, f"New normal range: {normal}, unless you say otherwise."),
-        (("Since", since), *_facts(a, 0)),
-        (("Check", check),),
+        (first, where(a), next_call(now.expected)),
+        dive_numbers(a, now),
+        do=(
+            "Nothing, if it was you.",
+            "Else find out why; to say otherwise, set normal_speed for this glider in the configuration.",
+        ),
+        links=map_of(a.lat, a.lon),
     )
-    return f"NEW NORMAL {name}: flies {what}, {a.speed:.2f} m/s (now normal: {normal})", page
+    return titled(glider, f"NEW NORMAL: flies {what}, {a.speed:.2f} m/s", f" ({normal_range(a)})"), page
 
 
 def _advice(advice: Advice) -> str:
@@ -169,58 +235,55 @@ def flag_words(assessment: Assessment, *, short: bool = False) -> str:
     if assessment.flag is None:
         reason = clean(assessment.reason, 60)
         return f"not assessed ({reason})" if reason else "not assessed"
-    words = {
-        Flag.NORMAL: ("normal", ""),
-        Flag.ANOMALY: ("anomaly", "speed out of its normal range"),
-        Flag.FALSE_ALARM: ("measurements disagree", "flow and reference disagree"),
-    }[Flag(assessment.flag)]
-    if short or assessment.flag == Flag.NORMAL:
-        return words[0]
-    return f"{words[0]}: {clean(assessment.reason, 100) or words[1]}"
+    if assessment.flag == Flag.NORMAL:
+        return "normal"
+    likely = likeliest(Kind.ANOMALY if assessment.flag == Flag.ANOMALY else Kind.FALSE_ALARM, assessment)
+    word = "out of its range" if assessment.flag == Flag.ANOMALY else "measurements disagree"
+    return word if short else f"{word} ({likely.cause.words})"
 
 
 def _name(incident: Incident) -> str:
     return INCIDENTS[incident.kind]
 
 
-def _normal(a: Assessment) -> str:
-    return f"normal {a.speed_min:.2f} to {a.speed_max:.2f}"
+def _word(incident: Incident, dive: Assessment) -> str:
+    """What is wrong, in capitals."""
+    if incident.kind is Kind.FALSE_ALARM:
+        return "MEASUREMENTS DISAGREE"
+    value = known(dive.speed)
+    return "FAST" if value is not None and value > dive.speed_max else "SLOW"
 
 
-def _speed(a: Assessment) -> str:
-    """The speed, with a third digit where two would make it look within its range though it is not."""
-    value = known(a.speed)
-    if value is not None and out_of_range(a, value) and not out_of_range(a, round(value, 2)):
-        return f"{value:.3f} m/s"
-    return speed(value)
+def _title(glider: str, incident: Incident, dive: Assessment, likely: Likely) -> str:
+    word, short = _word(incident, dive), likely.cause.short
+    cause = f": {short}" if short else ""
+    if incident.kind is Kind.FALSE_ALARM:
+        return titled(glider, word, cause)
+    if known(dive.speed) is None:
+        return titled(glider, f"{word}, speed not known", f" ({normal_range(dive)})", cause)
+    return titled(glider, f"{word} {exact_speed(dive)}", f" ({normal_range(dive)})", cause)
 
 
-def _against_range(a: Assessment) -> str:
-    value = "speed unknown" if known(a.speed) is None else f"{_speed(a)} through water"
-    return f"{value} ({_normal(a)})"
+def _headline(incident: Incident, a: Assessment, likely: Likely) -> str:
+    """What is wrong since when, how badly, how sure, and the likeliest cause with what points to it."""
+    fact = f": {likely.fact}" if likely.fact else ""
+    sure = certainty(incident.kind, a, incident.dives)
+    since = f"since {utc(incident.since)} ({_dives(incident)})"
+    if incident.kind is Kind.FALSE_ALARM:
+        what = f"{name_of(a.glider)}: measurements disagree {since}: its speed is not known"
+    else:
+        fast = _word(incident, a) == "FAST"
+        what = f"{name_of(a.glider)} is {'fast' if fast else 'slow'} {since}: {speed_and_range(a)}{_share(a)}"
+    return f"{what}; {sure}. Likeliest cause: {likely.cause.words}{fact}."
 
 
-def _headline(kind: Kind, a: Assessment) -> str:
-    """What is wrong and how badly, in one sentence or two."""
-    value = known(a.speed)
-    if kind is Kind.FALSE_ALARM:
-        apart, p_e = difference(a), known(a.p_e)
-        size = ""
-        if apart is not None and p_e is not None and p_e > a.gamma_f:
-            size = f" by {speed(apart)} (p_E {p_e:.3f}, limit {a.gamma_f:.3f})"
-        why = clean(a.reason, 100) or "flow and reference disagree"
-        return f"{clean(a.glider, 40)}: {why}{size}. Its speed of {_speed(a)} cannot be trusted."
-    sentence = f"{clean(a.glider, 40)} flies at {_speed(a)} through the water"
-    if value is None or not out_of_range(a, value):
-        why = clean(a.reason, 100) if a.flag == Flag.ANOMALY else ""
-        return f"{sentence}, {_normal(a)} m/s" + (f": {why}." if why else ".")
-    bound, word = (a.speed_max, "highest") if value > a.speed_max else (a.speed_min, "lowest")
-    share = f"{int(100 * max(value, 0.0) / bound)} % of" if bound > 0 else "against"
-    return f"{sentence}: {share} its {word} normal speed of {speed(bound)}."
-
-
-def _since(incident: Incident) -> tuple[str, str]:
-    return "Since", f"{utc(incident.since)} ({_dives(incident)})"
+def _share(a: Assessment) -> str:
+    """How far the speed is from the usual one."""
+    value, middle = known(a.speed), number(a, "usual_speed")
+    if value is None or not middle:
+        return ""
+    part = abs(1 - max(value, 0.0) / middle)
+    return f", {100 * part:.0f} % {'below' if value < middle else 'above'} its usual {middle:.2f}"
 
 
 def _dives(incident: Incident) -> str:
@@ -228,37 +291,17 @@ def _dives(incident: Incident) -> str:
 
 
 def _worst(incident: Incident) -> str:
-    return f"{_speed(incident.worst)}, dive of {utc(incident.worst.t_dive)}"
+    return f"{exact_speed(incident.worst)}, dive of {utc(incident.worst.t_dive)}"
 
 
 def _summary(incident: Incident) -> str:
     state = "open" if incident.cleared_at is None else f"cleared {utc(incident.cleared_at)}"
     since = f"{_name(incident)} since {utc(incident.since)}"
-    return f"{since}, {_dives(incident)}, worst {_speed(incident.worst)}, {state}"
+    return f"{since}, {_dives(incident)}, worst {exact_speed(incident.worst)}, {state}"
 
 
-def _facts(a: Assessment, dives: int) -> tuple[tuple[str, str], ...]:
-    """Where, the dive, speed against range, flow against reference, how sure."""
-    link, apart, p_e = map_link(a.lat, a.lon), difference(a), known(a.p_e)
-    reference = flow(a.reference_u, a.reference_v)
-    if reference != UNKNOWN:
-        reference += " (final)" if a.reference_final else " (provisional)"
-    disagreement = ""
-    if apart is not None and p_e is not None:
-        disagreement = f"{speed(apart)}, p_E {p_e:.3f} (limit {a.gamma_f:.3f})"
-    return (
-        ("Where", place(a.lat, a.lon)),
-        *((("Map", link),) if link else ()),
-        ("Dive", f"{utc(a.t_dive)} to {utc(a.t_surface)}, segment {clean(a.segment, 60)}"),
-        ("Speed through water", f"{_speed(a)}, {_normal(a)} m/s"),
-        ("Flow learnt", flow(a.flow_u, a.flow_v)),
-        ("Reference flow", reference),
-        *((("Disagreement", disagreement),) if disagreement else ()),
-        ("How sure", how_sure(a, dives)),
-    )
-
-
-def _weighed(kind: Kind, a: Assessment) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    pro, con = weigh(a, kind)
-    nothing = ("nothing found in this dive",)
-    return ("Speaks for", pro or nothing), ("Speaks against", con or nothing)
+def _weighed(incident: Incident, a: Assessment, likely: Likely) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    pro, con = weigh(a, incident.kind, likely.cause)
+    about = likely.cause.words if likely.cause.short else f"{_word(incident, a).lower()}, whatever the cause"
+    lists = ((f"For: {about}", pro), (f"Against: {about}", con))
+    return tuple((heading, lines) for heading, lines in lists if lines)

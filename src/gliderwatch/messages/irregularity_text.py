@@ -4,12 +4,28 @@ from __future__ import annotations
 
 from gliderwatch.incidents.notices import Irregularity, OldDates, TwoGliders
 from gliderwatch.messages.formatting import duration, place, utc
+from gliderwatch.messages.lines import name_of
+from gliderwatch.messages.template import Page, Text, titled, told_and_todo
 from gliderwatch.navigation.clock import DAY, ROLLOVER, ClockStep, span
 
 
-def words(found: Irregularity) -> tuple[str, str]:
-    """Its title, and what is known of it."""
-    return title(found), _text(found)
+def irregular(_: str, found: Irregularity) -> Text:
+    """Files of a glider are wrong although its flight may be right."""
+    lead, todo = told_and_todo(_text(found))
+    first = f"{name_of(found.glider)}: {title(found)}, since {utc(found.t)}."
+    return titled(found.glider, _short(found)), Page((first, *lead), do=todo)
+
+
+def _short(found: Irregularity) -> str:
+    what = found.what
+    if isinstance(what, OldDates):
+        return f"OLD DATES: files are {_age(what)} old"
+    if isinstance(what, TwoGliders):
+        return "TWO GLIDERS under this name"
+    if what.step < 0:
+        return "CLOCK right again"
+    by = f" by {span(abs(what.step))}" if what.is_corrected else ", not known by how much"
+    return f"CLOCK fell back{by}"
 
 
 def title(found: Irregularity) -> str:

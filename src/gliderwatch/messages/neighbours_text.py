@@ -3,54 +3,68 @@ Pure."""
 
 from __future__ import annotations
 
-from math import degrees
+from math import degrees, exp
 
-from gliderwatch.fleet.cross_check import Fault
+from gliderwatch.fleet.cross_check import Fault, Hypothesis
 from gliderwatch.incidents.notices import DiffersFromNeighbours
+from gliderwatch.messages.evidence import CERTAIN
 from gliderwatch.messages.formatting import clean, utc
-from gliderwatch.messages.template import Page, Text
+from gliderwatch.messages.lines import name_of, silence
+from gliderwatch.messages.template import Page, Text, titled
 
 _CHECKS = {
     Fault.LOSS: (
-        "the roll, before and after: a wing that is lost or bent rolls the glider, most of the time",
-        "fly another heading for some dives: a current stays, a loss turns with the glider",
-        "`normal_speed`, if it was launched like that",
+        "Plot the roll before and after: a lost or bent wing rolls the glider, most of the time.",
+        "Fly another heading for some dives: a current stays, a loss turns with the glider.",
+        "If it was launched like that, set `normal_speed`.",
     ),
     Fault.TURN: (
-        "the compass: was anything magnetic changed on board, or the pitch battery moved far?",
-        "the magnetic variation that the glider uses (m_gps_mag_var)",
-        "fly another heading for some dives: a current stays, an error of the compass turns with the glider",
+        "Compass: was anything magnetic changed on board, or the pitch battery moved far?",
+        "Check the magnetic variation that the glider uses (m_gps_mag_var).",
+        "Fly another heading for some dives: a current stays, an error of the compass turns with it.",
     ),
 }
 _SHARED = (
-    "what the gliders have in common: magnetic variation, configuration, a script that sets headings",
-    "a storm or a front that all of them met",
+    "Look for what they share: magnetic variation, configuration, a script that sets headings.",
+    "Was there a storm or a front that all of them met? Then nothing.",
 )
 
 
 def differs(glider: str, content: DiffersFromNeighbours) -> Text:
     """The currents of a glider, or of all alike, are not those that its neighbours measure."""
     found, shared = content.found, not content.found.glider
-    name = "the fleet" if shared else clean(glider, 40)
     what = _what(found.fault, found.size)
-    lead = f"The currents that {name} reports do not fit those of its neighbours. It {what}."
+    chance = min(1 / (1 + exp(-found.ratio / 2)), CERTAIN)  # twice the log of the odds
+    since = f"since {utc(found.since)} ({found.dives} dives); almost sure ({100 * chance:.0f} %)"
     if shared:
-        lead = f"The currents of all gliders about {clean(glider, 40)} misfit alike: as if each {what}. "
-        lead += "That is one error that they share, not many faults."
+        first = (
+            f"The currents of all gliders about {name_of(glider)} misfit alike, as if each {what}, {since}. "
+        )
+        first += "That is one error that they share, not many faults."
+    else:
+        first = f"{name_of(glider)} {what}, {since}: its currents do not fit those of its neighbours."
     page = Page(
-        (lead,),
+        (first,),
         (
-            ("Since", f"{utc(found.since)}, {found.dives} dives"),
             ("How much", _amount(found.fault, found.size, found.sigma)),
             (
                 "Compared with",
                 f"{_names(content.neighbours)}; the next is {content.nearest / 1e3:.0f} km away",
             ),
-            ("Evidence", f"a likelihood ratio of {found.ratio:.0f}"),
         ),
-        (("Check", _SHARED if shared else _CHECKS[found.fault]),),
+        do=_SHARED if shared else _CHECKS[found.fault],
+        links=silence(glider),
+        symbols=(f"twice the log likelihood ratio {found.ratio:.0f}",),
     )
-    return f"DIFFERS FROM NEIGHBOURS {name}: {what}", page
+    short = "LOSES SPEED" if found.fault is Fault.LOSS else "COMPASS OFF"
+    if shared:
+        return titled(glider, "and all about it: DIFFERENT CURRENTS", f" ({_short(found)})"), page
+    return titled(glider, f"{short} by {_short(found)}, say its neighbours"), page
+
+
+def _short(found: Hypothesis) -> str:
+    size = 100 * found.size if found.fault is Fault.LOSS else abs(degrees(found.size))
+    return f"{size:.0f} {'%' if found.fault is Fault.LOSS else 'degrees'}"
 
 
 def _what(fault: Fault, size: float) -> str:

@@ -1,7 +1,7 @@
 """A notice becomes a message: the one place where what is due gets its words. Pure.
 
 To give a new notice its words, write a function `(glider, content) -> title and page` beside those of its
-kind and add it to `_WRITERS`.
+kind and add it to `_WRITERS`; CONTRIBUTING.md has it step by step.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from gliderwatch.messages import (
     unjudged_text,
 )
 from gliderwatch.messages.formatting import clean, utc
-from gliderwatch.messages.template import Page, Text
+from gliderwatch.messages.template import Page, Text, titled, told_and_todo
 from gliderwatch.model import Alert, Kind, Severity
 
 _WRITERS: dict[type, Callable[[str, Any], Text]] = {
@@ -28,6 +28,7 @@ _WRITERS: dict[type, Callable[[str, Any], Text]] = {
     n.StillOpen: incident_text.still_open,
     n.Cleared: incident_text.cleared,
     n.Corrected: incident_text.corrected,
+    n.Acknowledged: incident_text.acknowledged,
     n.Surfaced: incident_text.surfaced,
     n.NewRegime: incident_text.new_regime,
     n.Overdue: overdue_text.overdue,
@@ -44,7 +45,7 @@ _WRITERS: dict[type, Callable[[str, Any], Text]] = {
     n.HealthReminder: health_text.reminder,
     n.HealthOver: health_text.over,
     n.DiffersFromNeighbours: neighbours_text.differs,
-    n.Irregularity: lambda _, found: _of_operator(*irregularity_text.words(found), found.t),
+    n.Irregularity: irregularity_text.irregular,
 }
 """How each content of a notice reads, of which glider."""
 
@@ -52,7 +53,6 @@ _WRITERS: dict[type, Callable[[str, Any], Text]] = {
 def render(notice: n.Notice) -> Alert:
     """The message of a notice."""
     title, page = _WRITERS[type(notice.content)](notice.glider, notice.content)
-    title = clean(title)
     return Alert(
         id=notice.id,
         glider=notice.glider,
@@ -64,6 +64,7 @@ def render(notice: n.Notice) -> Alert:
         title=title,
         body=page.text(),
         html=page.html(title),
+        brief=page.brief(),
     )
 
 
@@ -75,14 +76,19 @@ def operator(
     alert_id: str,
     severity: Severity,
     audience: Severity,
-    glider: str = "",
+    machine: str = "",
 ) -> Alert:
-    """A message about the watch itself, not about a flight: a folder gone, files that cannot be read."""
-    subject, page = _of_operator(title, text, time, glider)
-    subject = clean(subject)
+    """A message about the watch itself on a ``machine``, not about a flight: a folder gone, a full disk.
+
+    Lines of the ``text`` that begin with "What to do: " say that.
+    """
+    lead, todo = told_and_todo(text)
+    who = f"GLIDERWATCH {clean(machine, 16)}" if machine else "GLIDERWATCH"
+    subject = titled("", f"{who}: {title}")
+    page = Page((f"{who}, {utc(time)}: {clean(title)}.", *lead), do=todo)
     return Alert(
         id=alert_id,
-        glider=glider,
+        glider="",
         time=time,
         kind=Kind.OPERATOR,
         severity=severity,
@@ -91,10 +97,5 @@ def operator(
         title=subject,
         body=page.text(),
         html=page.html(subject),
+        brief=page.brief(),
     )
-
-
-def _of_operator(title: str, text: str, time: float, glider: str = "") -> Text:
-    lines = tuple(line for line in (clean(raw, 500) for raw in text.splitlines()) if line)
-    subject = f"GLIDERWATCH {clean(glider, 40)}: {title}" if glider else f"GLIDERWATCH: {title}"
-    return subject, Page(lines, (("Time", utc(time)),))

@@ -1,55 +1,61 @@
 """What people read when a glider stays away, and when it calls again. Pure.
 
-The same form as `messages.incident_text`: what and how bad, since when, where to look, what speaks
-for trouble and against it, what to check.
+The same form as `messages.incident_text`: what, since when, how sure; where to search; next call; what to do.
 """
 
 from __future__ import annotations
 
-from gliderwatch.incidents.notices import Absence, CalledAgain, CalledInTime, Fleet, Overdue
-from gliderwatch.messages.formatting import INCIDENTS, clean, duration, flow, map_link, place, utc
-from gliderwatch.messages.template import Page, Text
+from gliderwatch.incidents.notices import Absence, CalledAgain, CalledInTime, DriftEllipse, Fleet, Overdue
+from gliderwatch.messages.formatting import (
+    INCIDENTS,
+    UNKNOWN,
+    clean,
+    duration,
+    flow,
+    place,
+    short_place,
+    utc,
+)
+from gliderwatch.messages.lines import map_of, name_of, silence, where
+from gliderwatch.messages.template import Page, Text, titled
 from gliderwatch.model import Assessment
 
-_EACH = (
-    "This stands for all of them: each of the others is told by itself if it still stays away when one calls."
-)
+_EACH = "This stands for all of them: each that still stays away when one calls gets a message of its own."
+_ROUND = 0.9
+"""Ratio of the semi-axes from which an ellipse is called a circle."""
 
 
 def overdue(glider: str, content: Overdue) -> Text:
     """The glider is overdue, or still is."""
-    a, silent = content.absence, duration(content.absence.now - content.absence.heard)
-    lead = f"{_name(glider)} is overdue: it was expected {utc(a.awaited)} and has been silent for {silent}."
-    if not content.first:
-        lead = f"Still no sign of life. {lead}"
+    a = content.absence
+    late, silent = duration(a.now - a.awaited), duration(a.now - a.heard)
+    still = "" if content.first else "still "
+    first = f"{name_of(glider)} is {still}overdue by {late}: its call of {utc(a.awaited)} did not come, "
+    first += f"silent for {silent}. {_side(a.fleet)}"
     trouble, harmless = _weighed(a)
+    lists = (("For trouble of the glider", trouble), ("Against", harmless))
     page = Page(
-        (lead, *_remark(a.fleet)),
-        (
-            ("Silent since", utc(a.heard)),
-            ("Expected", f"{utc(a.awaited)}, {place(a.lat, a.lon)}"),
-            *_last(a.last),
-            *_look(a),
-        ),
-        (("Speaks for trouble", trouble), ("Speaks against", harmless), ("Check", _checks(a))),
+        (first, _search(a), "Next call: not known any more; the first sign of life is reported at once."),
+        _numbers(a),
+        tuple((heading, lines) for heading, lines in lists if lines),
+        _todo(a),
+        (*(() if a.area is None else map_of(a.area.lat, a.area.lon)), *silence(glider)),
     )
-    title = f"{'' if content.first else 'STILL '}OVERDUE {_name(glider)}: silent for {silent}, "
-    title += f"expected {utc(a.awaited)}"
-    if a.fleet.is_silent:
-        title += f", as all {a.fleet.others + 1} gliders: shore side?"
-    return title, page
+    more = f", all {a.fleet.others + 1} silent: dockserver?" if a.fleet.is_silent else ""
+    return titled(glider, f"{still.upper()}OVERDUE {late}", more), page
 
 
 def called_again(glider: str, content: CalledAgain) -> Text:
     """The glider gave a sign of life."""
     silent = duration(content.at - content.heard)
-    lead = f"{_name(glider)} calls again: {utc(content.at)}, after {silent} of silence. "
-    lead += "It is not overdue any more."
+    first = f"{name_of(glider)} calls again: {utc(content.at)}, after {silent} of silence. "
+    first += "It is not overdue any more."
     page = Page(
-        (lead, *((_EACH,) if content.for_all else ())),
+        (first, where(content.last), *((_EACH,) if content.for_all else ())),
         (("Silent", f"{utc(content.heard)} to {utc(content.at)}"), *_last(content.last)),
+        do=("Nothing; its dives are judged as its files come.",),
     )
-    return f"ALL CLEAR {_name(glider)}: it calls again after {silent}", page
+    return titled(glider, f"ALL CLEAR: calls again after {silent}"), page
 
 
 def called_in_time(glider: str, content: CalledInTime) -> Text:
@@ -57,27 +63,51 @@ def called_in_time(glider: str, content: CalledInTime) -> Text:
     at = content.at
     page = Page(
         (
-            f"Correction for {_name(glider)}: it was up {utc(at)}, in time. "
-            "Its files came late or not at all: not the glider was slow, but their way to here.",
+            f"{name_of(glider)} was at the surface {utc(at)}, in time: it was never overdue. "
+            "Its files came late or not at all: the delay was on shore.",
         ),
-        (("Told before", f"overdue since {utc(content.due)}"), ("Known now", f"at the surface {utc(at)}")),
-        (("Check", ("dockserver, modem and network of that time",)),),
+        (("Reported before", f"overdue since {utc(content.due)}"), ("So it is now", f"up {utc(at)}")),
+        do=("Look at dockserver, modem and network of that time.",),
     )
-    return f"CORRECTION {_name(glider)}: it was up in time, {utc(at)}; its files came late", page
+    return titled(glider, "CORRECTION: was up in time, its files are late"), page
 
 
-def _name(glider: str) -> str:
-    return clean(glider, 40)
+def _side(fleet: Fleet) -> str:
+    """How sure it is that it is the glider, in a word and a number."""
+    if not fleet.others:
+        return "Glider or shore side: not known, it is the only one at sea."
+    calling = fleet.others - fleet.late
+    which = "the shore side" if fleet.is_silent else "the glider"
+    word = "Likely" if fleet.is_silent or calling > fleet.late else "Perhaps"
+    return f"{word} {which}: {calling} of {fleet.others} other gliders call."
 
 
-def _remark(fleet: Fleet) -> tuple[str, ...]:
-    """The one thing an operator would say first where no glider calls."""
-    if not fleet.is_silent:
-        return ()
-    others = "the other glider is" if fleet.others == 1 else f"all {fleet.others} other gliders are"
-    since = "" if fleet.last is None else f", no file of any of them since {utc(fleet.last)}"
-    names = f" ({', '.join(map(_name, fleet.names))})" if fleet.names else ""
-    return (f"Look at dockserver and modem first: {others} late as well{since}{names}.", _EACH)
+def _search(a: Absence) -> str:
+    """Where to search, and which way it drifts."""
+    sets = flow(*(a.flow or (None, None)))
+    drift = "drift not known" if sets == UNKNOWN else f"drifts {sets}"
+    if a.area is None:
+        return f"Where it is, is not known; {drift}."
+    return f"Search here: {short_place(a.area.lat, a.area.lon)}, {_size(a.area)}; {drift}."
+
+
+def _size(area: DriftEllipse) -> str:
+    if area.minor >= _ROUND * area.major:
+        return f"95 % within {area.major / 1000:.1f} km"
+    axes = f"95 % within {area.major / 1000:.1f} x {area.minor / 1000:.1f} km"
+    return f"{axes}, the longer towards {round(area.bearing) % 180:03d}°"
+
+
+def _numbers(a: Absence) -> tuple[tuple[str, str], ...]:
+    spot = place(a.lat, a.lon)
+    there = "" if spot == UNKNOWN else f" at {spot}"
+    area = () if a.area is None else (("Search here", place(a.area.lat, a.area.lon)),)
+    return (
+        ("Silent since", utc(a.heard)),
+        ("Expected", f"{utc(a.awaited)}{there}"),
+        *_last(a.last),
+        *area,
+    )
 
 
 def _last(dive: Assessment | None) -> tuple[tuple[str, str], ...]:
@@ -86,38 +116,26 @@ def _last(dive: Assessment | None) -> tuple[tuple[str, str], ...]:
     return (("Last position", f"{place(dive.lat, dive.lon)}, surfaced {utc(dive.t_surface)}"),)
 
 
-def _look(a: Absence) -> tuple[tuple[str, str], ...]:
-    """Where to look: the middle of the area, its size and direction, the current that it rests upon."""
-    if a.area is None:
-        return (("Look at", "no position is known"),)
-    area = a.area
-    size = f"95 % within {area.major / 1000:.1f} x {area.minor / 1000:.1f} km (semi-axes), "
-    size += f"longer towards {round(area.bearing) % 180:03d}° true"
-    drift = "" if a.last is None else flow(*(a.flow or (None, None)))
-    return (
-        ("Look at", place(area.lat, area.lon)),
-        ("Map", map_link(area.lat, area.lon)),
-        ("Area", size),
-        *((("Drift", f"last known current, {drift}"),) if drift else ()),
-    )
-
-
 def _weighed(a: Absence) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """What speaks for trouble of the glider, and what against."""
-    names = [f"{INCIDENTS[i.kind]} open since {utc(i.since)}" for i in a.incidents]
+    names = tuple(f"{INCIDENTS[i.kind]} open since {utc(i.since)}" for i in a.incidents)
     fleet, well = a.fleet, a.fleet.others - a.fleet.late
     calling = (f"{well} of {fleet.others} other gliders call as expected",) if well > 0 else ()
-    late = (f"{fleet.late} of {fleet.others} other gliders are late as well",) if fleet.late else ()
+    since = "" if fleet.last is None else f", no file of any of them since {utc(fleet.last)}"
+    late = (f"{fleet.late} of {fleet.others} other gliders are late as well{since}",) if fleet.late else ()
     none = () if names else ("no incident was open before",)
-    alone = () if fleet.others else ("no other glider at sea to tell glider and shore side apart",)
-    return (*names, *calling) or ("nothing but the silence",), (*none, *late, *alone)
+    return (*names, *calling)[:3], (*none, *late)[:3]
 
 
-def _checks(a: Absence) -> tuple[str, ...]:
+def _todo(a: Absence) -> tuple[str, ...]:
+    """What to do, by who else is silent."""
+    if a.fleet.is_silent:
+        names = f" ({', '.join(map(name_of, a.fleet.names))})" if a.fleet.names else ""
+        who = "the other glider is" if a.fleet.others == 1 else f"all {a.fleet.others} other gliders are"
+        return (f"Look at dockserver and modem first: {clean(who, 60)} silent as well{names}.", _EACH)
+    open_ = "" if not a.incidents else " An incident was open: plan to go there."
     return (
-        "dockserver, modem and network: does a file of any glider come?",
-        "the Iridium and Argos positions of the glider, if it has a beacon of its own",
-        "the mission that runs: a longer interval, a no-comms or drift behaviour",
-        "the last dives: leak, voltage, vacuum, aborts",
-        *(("the ships and gliders near the area",) if a.area is not None else ()),
+        f"Read the dockserver's log: did it call without a file?{open_}",
+        "Was a longer dive or mission sent? Then set overdue_hours, or mute it until it is due.",
+        "Look up positions by Iridium or Argos, if it has a beacon; tell ships near the area.",
     )

@@ -13,6 +13,7 @@ from gliderwatch.incidents.notices import (
     Aborted,
     AbortReport,
     Absence,
+    Acknowledged,
     Blind,
     Blindness,
     CalledWithoutFile,
@@ -26,6 +27,7 @@ from gliderwatch.incidents.notices import (
     Notice,
     Opened,
     Overdue,
+    Situation,
     StillOpen,
     Surfaced,
     Unjudged,
@@ -78,7 +80,9 @@ _SLOW = Assessment(
         "pitch_dive": -0.45,
         "pitch_climb": 0.30,
         "roll_mean": 0.31,
-        "speed_before": 0.256,
+        "speed_before": 0.118,
+        "speed_sigma": 0.03,
+        "usual_speed": 0.255,
     },
     notes=(),
     parameters="",
@@ -90,7 +94,8 @@ _DISAGREE = replace(
     p_e=0.412,
     reference_u=-0.3,
     reference_v=-0.2,
-    evidence={"duration_h": 3.4, "across_misfit": 0.31, "along_speed": 0.02},
+    reason="the current is wrong",
+    evidence={"duration_h": 3.4, "across_misfit": 0.31, "across_sigma": 0.05},
 )
 
 
@@ -98,12 +103,7 @@ def sample(kind: Kind, now: float) -> Alert:
     """A message of a kind as it would be made at `now` (s)."""
     alert = SAMPLES[kind](now)
     return replace(
-        alert,
-        id=f"sample/{kind}/{now:.3f}",
-        incident="",
-        title=f"SAMPLE {alert.title}",
-        body=f"{_LEAD}\n\n{alert.body}",
-        html=with_lead(alert.html, _LEAD),
+        with_lead(alert, _LEAD), id=f"sample/{kind}/{now:.3f}", incident="", title=f"SAMPLE {alert.title}"
     )
 
 
@@ -123,7 +123,8 @@ def _message(kind: Kind, severity: Severity, time: float, content: Content) -> A
 def _opened(kind: Kind, dive: Assessment, severity: Severity) -> Callable[[float], Alert]:
     def make(now: float) -> Alert:
         worst = _at(dive, now)
-        return _message(kind, severity, now, Opened(_incident(kind, worst, severity), worst))
+        situation = _situation(worst, 0.256, 0.249, 0.253, 0.118)
+        return _message(kind, severity, now, Opened(_incident(kind, worst, severity), worst, situation))
 
     return make
 
@@ -131,12 +132,15 @@ def _opened(kind: Kind, dive: Assessment, severity: Severity) -> Callable[[float
 def _all_clear(now: float) -> Alert:
     worst = _at(_SLOW, now - 8 * _HOUR)
     over = replace(_incident(Kind.ANOMALY, worst, Severity.CRITICAL), cleared_at=now)
-    return _message(Kind.ALL_CLEAR, Severity.INFO, now, Cleared(over, _at(_HEALTHY, now)))
+    well = _at(_HEALTHY, now)
+    content = Cleared(over, well, _situation(well, 0.112, 0.118, 0.244))
+    return _message(Kind.ALL_CLEAR, Severity.INFO, now, content)
 
 
 def _reminder(now: float) -> Alert:
     incident = _incident(Kind.ANOMALY, _at(_SLOW, now - 24 * _HOUR), Severity.CRITICAL)
-    content = StillOpen(incident, _at(_SLOW, now), 24.0)
+    dive = _at(_SLOW, now)
+    content = StillOpen(incident, dive, 24.0, _situation(dive, 0.118, 0.12, 0.109, 0.115))
     return _message(Kind.REMINDER, Severity.CRITICAL, now, content)
 
 
@@ -147,6 +151,7 @@ def _correction(now: float) -> Alert:
         None,
         replace(dive, flag=Flag.NORMAL, speed=0.24),
         "the depth-averaged current of the dive was corrected",
+        _situation(_at(_HEALTHY, now), 0.256, 0.24),
     )
     return _message(Kind.CORRECTION, Severity.INFO, dive.t_surface, content)
 
@@ -177,7 +182,8 @@ def _unknown(now: float) -> Alert:
         for start, end in ((23, 20), (19, 16), (15, 12), (11, 8), (7, 4), (3, 0))
     ]
     found = Blindness(GLIDER, now - 24 * _HOUR, now, now - 24 * _HOUR, tuple(waits))
-    return _message(Kind.UNKNOWN, Severity.WARNING, now, Blind(found, first=True))
+    content = Blind(found, True, _situation(_at(_HEALTHY, now - 24 * _HOUR)))
+    return _message(Kind.UNKNOWN, Severity.WARNING, now, content)
 
 
 def _call(now: float) -> Call:
@@ -210,21 +216,38 @@ def _neighbours(now: float) -> Alert:
 
 
 def _surfacing(now: float) -> Alert:
-    expected = NextSurfacing(now, now + 4 * _HOUR, 1500.0, 24.21, -83.01, 1e6, 0.0, 1e6, "its last dives")
     dive = _at(_HEALTHY, now)
-    return _message(Kind.SURFACING, Severity.INFO, now, Surfaced(dive, now - 4 * _HOUR, expected))
+    return _message(Kind.SURFACING, Severity.INFO, now, Surfaced(dive, now - 4 * _HOUR, _next(now)))
+
+
+def _next(now: float) -> NextSurfacing:
+    return NextSurfacing(now, now + 4 * _HOUR, 1500.0, 24.21, -83.01, 1e6, 0.0, 1e6, "its last dives")
+
+
+def _situation(dive: Assessment, *earlier: float) -> Situation:
+    """How it stands after a dive, with the speeds of those before it."""
+    return Situation(dive, (*earlier, dive.speed), _next(dive.t_surface))
+
+
+def _acknowledged(now: float) -> Alert:
+    incident = _incident(Kind.ANOMALY, _at(_SLOW, now - _HOUR), Severity.CRITICAL)
+    content = Acknowledged(incident.id, incident.kind, incident.since, "Ann", "boat leaves at 6", False)
+    return _message(Kind.ACKNOWLEDGED, Severity.INFO, now, content)
 
 
 def _regime(now: float) -> Alert:
     dive = replace(_at(_HEALTHY, now), speed=0.49, speed_min=0.42, speed_max=0.66)
-    return _message(Kind.REGIME, Severity.INFO, now, NewRegime(dive, 0.29, now - 10 * _HOUR))
+    return _message(
+        Kind.REGIME, Severity.INFO, now, NewRegime(dive, 0.29, now - 10 * _HOUR, _situation(dive))
+    )
 
 
 def _operator(now: float) -> Alert:
     return operator(
         "no file of any glider for 26.0 h",
-        "Check the dockserver, its modems and telephone lines, and the share that its folders are on.",
+        "What to do: look at the dockserver, its modems, and the share that its folders are on.",
         now,
+        machine="sample-machine",
         alert_id="",
         severity=Severity.WARNING,
         audience=Severity.WARNING,
@@ -243,6 +266,7 @@ SAMPLES: dict[Kind, Callable[[float], Alert]] = {
     Kind.REMINDER: _reminder,
     Kind.CORRECTION: _correction,
     Kind.REGIME: _regime,
+    Kind.ACKNOWLEDGED: _acknowledged,
     Kind.SURFACING: _surfacing,
     Kind.OPERATOR: _operator,
 }

@@ -6,7 +6,8 @@ from collections import defaultdict
 
 from gliderwatch.incidents.notices import Blind, JudgedAgain, Unjudged
 from gliderwatch.messages.formatting import clean, duration, utc
-from gliderwatch.messages.template import Page, Text
+from gliderwatch.messages.lines import name_of, next_call, silence, where
+from gliderwatch.messages.template import Page, Text, sentence, titled
 from gliderwatch.model import Hindrance, Unusable
 
 _SHOWN = 4
@@ -34,36 +35,58 @@ CURES: dict[Unusable | Hindrance | None, str] = {
 """What a pilot can do about each reason."""
 
 
+_SHORT: dict[Unusable | Hindrance | None, str] = {
+    Hindrance.NO_CACHE: "cache file missing",
+    Hindrance.UNREADABLE: "files unreadable",
+    Hindrance.DAMAGED: "files damaged",
+    Hindrance.NOT_ASSESSED: "fault of gliderwatch",
+    Unusable.NOT_SURFACED: "no fix",
+    Unusable.NO_FIX_BEFORE: "no fix",
+    Unusable.STALE_FIX: "old fix",
+    Unusable.WILD_FIX: "wild fix",
+    Unusable.DATA_MISSING: "files missing",
+    Unusable.SURFACE_DRIFT: "no dives seen",
+    Unusable.NO_HEADING: "no heading",
+    Unusable.TURNING: "heading unclear",
+}
+"""Each reason in a title."""
+
+
 def blind(glider: str, content: Blind) -> Text:
     """No dive can be judged, or still none can."""
-    found, reasons = content.found, _reasons(content.found.items)
+    found, now, reasons = content.found, content.situation, _reasons(content.found.items)
     (main, count), lasted = reasons[0], duration(found.until - found.since)
-    lead = f"{'No' if content.first else 'Still no'} dive of {_name(glider)} could be judged for "
-    lead += f"{lasted}, although it is at sea and its files come. A fault of the glider would not be seen."
+    of = len(found.items)
+    first = f"{'No' if content.first else 'Still no'} dive of {name_of(glider)} could be judged since "
+    first += f"{utc(found.since)} ({lasted}); sure ({count} of {of}): {clean(main.words, 120)}. "
+    first += "A fault of the glider would not be seen."
     last = "none yet" if found.judged is None else f"surfaced {utc(found.judged)}"
+    others = tuple(_reason(*reason) for reason in reasons[1:])
     page = Page(
-        (lead,),
+        (first, where(now.last), next_call(now.expected)),
         (
-            ("Since", utc(found.since)),
             ("Last dive that could be judged", last),
             ("Main reason", f"{_counted(main, count)}: {clean(main.words, 300)}"),
         ),
-        (
-            ("What to do", tuple(dict.fromkeys(_cure(item) for item, _ in reasons))),
-            *((("Other reasons", tuple(_reason(*reason) for reason in reasons[1:])),) if reasons[1:] else ()),
-        ),
+        ((("Other reasons", others),) if others else ()),
+        tuple(dict.fromkeys(_cure(item) for item, _ in reasons))[:3],
+        silence(glider),
     )
-    title = f"{'' if content.first else 'REMINDER '}CANNOT BE JUDGED {_name(glider)}: {lasted} without "
-    title += f"a judgement, {clean(main.words, 80)}"
-    return title, page
+    short = _SHORT.get(main.cause, "")
+    still = "" if content.first else "STILL "
+    return titled(glider, f"{still}CANNOT BE JUDGED for {lasted}", f": {short}" if short else ""), page
 
 
 def judged_again(glider: str, content: JudgedAgain) -> Text:
     """A dive could be judged again."""
     lasted = duration(content.at - content.since)
-    lead = f"Dives of {_name(glider)} can be judged again, after {lasted} without a judgement."
-    page = Page((lead,), (("Without a judgement", f"{utc(content.since)} to {utc(content.at)}"),))
-    return f"ALL CLEAR {_name(glider)}: its dives can be judged again", page
+    first = f"Dives of {name_of(glider)} can be judged again, after {lasted} without a judgement."
+    page = Page(
+        (first,),
+        (("Without a judgement", f"{utc(content.since)} to {utc(content.at)}"),),
+        do=("Nothing.",),
+    )
+    return titled(glider, "ALL CLEAR: its dives can be judged again"), page
 
 
 def _reasons(items: tuple[Unjudged, ...]) -> list[tuple[Unjudged, int]]:
@@ -85,8 +108,4 @@ def _counted(item: Unjudged, count: int) -> str:
 
 
 def _cure(item: Unjudged) -> str:
-    return CURES[item.cause].format(cache=f"{clean(item.crc, 40)}.cac")
-
-
-def _name(glider: str) -> str:
-    return clean(glider, 40)
+    return sentence(CURES[item.cause].format(cache=f"{clean(item.crc, 40)}.cac")) + "."

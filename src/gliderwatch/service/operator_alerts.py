@@ -6,6 +6,7 @@ What is open is read back from the messages in the state file, so that a restart
 from __future__ import annotations
 
 import shutil
+import socket
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -70,7 +71,8 @@ def troubles(vitals: Vitals, limits: Settings, open_: Iterable[str], now: float)
     if free is not None and vitals.free is not None and vitals.free < free * (1.2 if DISK in going_on else 1):
         found[DISK] = Trouble(
             f"only {vitals.free:.0f} MB free for the state file",
-            "When it is full nothing can be assessed and no message be made. Make room, or move the state.",
+            "When it is full nothing can be assessed and no message be made.\n"
+            "What to do: make room, or move the state.",
         )
     for name, channel in vitals.failing.items():
         late = now - channel.since
@@ -79,7 +81,8 @@ def troubles(vitals: Vitals, limits: Settings, open_: Iterable[str], now: float)
                 f"channel {name} has not delivered for {duration(late)}",
                 f"{channel.messages} messages were not taken. All that it did not refuse for good is tried "
                 "again.\n"
-                f"The reason it gives: {channel.error or 'none'}",
+                f"The reason it gives: {channel.error or 'none'}\n"
+                f"What to do: try `gliderwatch test-alert --channel {name}`.",
             )
     return found
 
@@ -91,16 +94,15 @@ def _silences(vitals: Vitals, limits: Settings, now: float) -> dict[str, Trouble
         return {}
     if vitals.silent > hours * HOUR:
         title = f"no file of any glider for {duration(vitals.silent)}"
-        text = (
-            f"The last one came {utc(now - vitals.silent)}. Check the dockserver, its modems and telephone "
-        )
-        text += "lines, and the share that its folders are on.\nUntil then no glider is watched."
+        text = f"The last one came {utc(now - vitals.silent)}. Until one comes no glider is watched.\n"
+        text += "What to do: look at the dockserver, its modems, and the share that its folders are on."
         return {SILENCE: Trouble(title, text)}
     return {
         f"{SILENCE}/{glider}": Trouble(
             f"no file of {glider} for {duration(silent)}",
-            f"The last one came {utc(now - silent)}; other gliders call. Check its folder on the dockserver. "
-            "If it is out of the water, say so: `recovered: true`, or `gliderwatch mute`.",
+            f"The last one came {utc(now - silent)}; other gliders call.\n"
+            "What to do: look at its folder on the dockserver.\n"
+            "What to do: if it is out of the water, say so: `recovered: true`, or `gliderwatch mute`.",
         )
         for glider, silent in vitals.missed.items()
         if silent > hours * HOUR
@@ -115,16 +117,17 @@ def _files(vitals: Vitals, limits: Settings, going_on: set[str], now: float) -> 
         if most is not None and count > most / (2 if key in going_on else 1):
             found[key] = Trouble(
                 f"{count} files of {glider or 'no known glider'} quarantined in 24 h",
-                "They cannot be used as they are. `gliderwatch status` names them with the reason. Many at "
-                "once mean a damaged disk, a transfer that cuts files, or a folder that is no glider's.",
+                "They cannot be used as they are. Many at once mean a damaged disk, a transfer that cuts "
+                "files, or a folder that is no glider's.\n"
+                "What to do: `gliderwatch status` names them with the reason.",
             )
     for glider, files in vitals.waiting.items():
         late = now - files.since
         if hours is not None and late > hours * HOUR:
             found[_key(WAITING, glider)] = Trouble(
                 f"files of {glider or 'no known glider'} have waited for {duration(late)}",
-                f"{files.files} wait; the oldest since {utc(files.since)}: {files.reason}.\nThey are "
-                "taken once that is mended. `gliderwatch status` names them all.",
+                f"{files.files} wait; the oldest since {utc(files.since)}: {files.reason}.\n"
+                "What to do: mend that, and they are taken. `gliderwatch status` names them all.",
             )
     return found
 
@@ -137,7 +140,7 @@ def over(key: str) -> str:
     """That a trouble is over, in words."""
     kind, _, name = key.partition("/")
     return {
-        SILENCE: f"files of {name} come again" if name else "files come again",
+        SILENCE: f"files of {name} come again" if name else "files of the gliders come again",
         QUARANTINE: f"hardly any files{f' of {name}' if name else ''} are quarantined any more",
         WAITING: f"no files{f' of {name}' if name else ''} wait any more",
         DISK: "there is room on the disk again",
@@ -238,12 +241,18 @@ def _begun(key: str, trouble: Trouble, now: float) -> Alert:
 
 
 def _ended(key: str, identity: str, since: float, now: float) -> Alert:
-    text = f"It was told {utc(since)}, {duration(max(0.0, now - since))} ago."
+    text = f"It was reported {utc(since)}, {duration(max(0.0, now - since))} ago.\nWhat to do: nothing."
     return _alert(over(key), text, now, identity + _OVER, identity, Severity.INFO)
 
 
 def _alert(title: str, text: str, now: float, identity: str, thread: str, severity: Severity) -> Alert:
     made = notice_text.operator(
-        title, text, now, alert_id=identity, severity=severity, audience=Severity.WARNING
+        title,
+        text,
+        now,
+        alert_id=identity,
+        severity=severity,
+        audience=Severity.WARNING,
+        machine=socket.gethostname(),
     )
     return replace(made, incident=thread)  # so that "over" cannot overtake what it ends

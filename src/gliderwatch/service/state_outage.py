@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -136,13 +137,15 @@ def _tell(aside: Path, config: Config) -> None:
         text = (
             f"It was found damaged and set aside as {aside.name}. All is made anew from the files on the "
             f"dockserver; dives of files that are not there any more are lost. {saved} messages, told or to "
-            "be told, were saved from it.\nLook after the disk. Delete the damaged file when nobody needs it."
+            "be told, were saved from it.\nWhat to do: look after the disk.\n"
+            "What to do: delete the damaged file when nobody needs it."
         )
         return notice_text.operator(
             "the state file was damaged",
             text,
             now,
             alert_id=f"state/{aside.name}",
+            machine=socket.gethostname(),
             severity=Severity.WARNING,
             audience=Severity.WARNING,
         )

@@ -63,6 +63,10 @@ class Annotations:
         row = (ack.incident, glider, ack.at, codec.plain_encode(ack))
         self._db.execute("INSERT OR REPLACE INTO acks VALUES (?, ?, ?, ?)", row)
 
+    def give_back(self, incident: str) -> None:
+        """Forget the acknowledgement of an incident."""
+        self._db.execute("DELETE FROM acks WHERE incident = ?", (incident,))
+
     def acks(self, glider: str) -> Acks:
         """The acknowledgements of a glider's incidents."""
         if not self._is_there("acks"):
