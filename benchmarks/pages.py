@@ -62,13 +62,13 @@ def state_of(path: Path, gliders: int, dives: int, now: float) -> list[str]:
             flown = tuple(dive(name, now - (dives - k) * 3.5 * HOUR, chance) for k in range(dives))
             identity = SegmentId(flown[-1].t_dive, name, flown[-1].segment)
             store.segments.put(Segment(identity, "m", "sbd", flown[-1].t_surface, (1, 1, ""), {}))
-            store.hear(identity, flown[-1].t_surface, now)
+            store.record_sign(identity, flown[-1].t_surface, now)
             last = flown[-1]
             expected = NextSurfacing(
                 last.t_surface, now + HOUR, 900.0, last.lat, last.lon, 1e6, 0.0, 1e6, "bench"
             )
             store.apply(name, Outcome(GliderState(), float("-inf"), flown, (), expected))
-            store.keep_said(name, NotificationState())
+            store.keep_notified(name, NotificationState())
     store.close()
     return names
 

@@ -188,7 +188,7 @@ def test_status_tells_gliders_and_files(site: Site) -> None:
     assert angus["latest"]["flag"] == 0
     assert angus["latest"]["t_surface"].endswith("Z")
     empty = {"configured": True, "segments": 0, "dives": 0, "latest": None, "incidents": []}
-    empty |= {"irregularities": []}
+    empty |= {"irregularities": [], "announced_and_not_come": [], "last_call": None, "open": []}
     silence = dict.fromkeys(("expected", "heard", "overdue_at", "muted_until"))
     assert bruce == empty | silence | {"overdue": False, "ended": False, "recovered": False}
     assert angus["ended"] and not angus["overdue"] and angus["expected"]["t"] > angus["latest"]["t_surface"]

@@ -40,27 +40,38 @@ def test_help_is_not_cut(columns: str) -> None:
     assert "..." not in shown.partition("Commands:")[2] and max(map(len, shown.splitlines())) <= int(columns)
 
 
-@pytest.mark.parametrize("name", main.commands)
-def test_every_command_has_an_example_that_can_be_typed(name: str) -> None:
-    found = main.commands[name]
-    shown = command(name, "-h", COLUMNS="80").stdout
+LEAVES = [
+    (name, *sub)
+    for name, found in main.commands.items()
+    for sub in (((each,) for each in found.commands) if isinstance(found, click.Group) else [()])
+]
+
+
+@pytest.mark.parametrize("names", LEAVES, ids=" ".join)
+def test_every_command_has_an_example_that_can_be_typed(names: tuple[str, ...]) -> None:
+    found: click.Command = main
+    for name in names:
+        assert isinstance(found, click.Group)
+        found = found.commands[name]
+    shown = command(*names, "-h", COLUMNS="80").stdout
     examples = [line.strip() for line in shown.partition("Example")[2].splitlines()[1:] if line.strip()]
     assert examples, shown
     assert max(map(len, shown.splitlines())) <= 80
     for line in examples:
         words = shlex.split(line)
         words = words[words.index("gliderwatch") + 1 :] if words[0] == "gliderwatch" else words[4:]
-        assert words[0] == name
-        found.make_parser(click.Context(found)).parse_args(args=words[1:])
+        assert tuple(words[: len(names)]) == names
+        found.make_parser(click.Context(found)).parse_args(args=words[len(names) :])
 
 
-@pytest.mark.parametrize("name", [n for n in main.commands if n not in ("simulate", "score")])
+@pytest.mark.parametrize("name", [n for n in main.commands if n not in ("simulate", "score", "layers")])
 def test_the_usual_configuration_is_that_of_every_command(name: str) -> None:
     (option,) = (p for p in main.commands[name].params if "-c" in p.opts)
     assert USUAL in " ".join(command(name, "-h").stdout.split())
     if Path(USUAL).exists():
         pytest.skip("this machine has one")
     needed = {"mute": ["electa", "--hours", "1"], "unmute": ["electa"], "ack": ["x"], "rebuild": ["electa"]}
+    needed |= {"field": ["upper", "--out", "upper.nc"], "export": ["--format", "csv"]}
     result = command(name, *needed.get(name, ["copy.sqlite"] if name == "backup" else []))
     assert result.returncode == 2 and USUAL in " ".join((result.stderr + result.stdout).split())
     assert option.name == "config_path"
@@ -153,9 +164,9 @@ def test_samples_arrive_whole_and_are_marked(tmp_path: Path) -> None:
     for mail in box.mails:
         assert mail.subject.strip().startswith("SAMPLE ") and mail.text.startswith("This is a sample")
     anomaly, overdue = (box.mails[OFFERED.index(kind)].text for kind in ("anomaly", "overdue"))
-    for part in ("0.11 m/s", "Flow", "Map: https://", "Speaks for", "Check"):
+    for part in ("0.11 m/s", "Likeliest cause", "Next call", "What to do", "Map: https://", "Take it on"):
         assert part in anomaly, anomaly
-    for part in ("is overdue", "Look at", "Map: https://", "Area", "Speaks against"):
+    for part in ("is overdue", "What to do", "Map: https://"):
         assert part in overdue, overdue
     assert not site.state.exists()
 

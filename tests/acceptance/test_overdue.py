@@ -43,7 +43,7 @@ def fly(folder: Path, end: float) -> Flight:
         back = decode(paths[-1], [folder / "cache"]).id.opened_at
         start += end - back
     opened = decode(paths[-3], [folder / "cache"]).id.opened_at
-    expected = store.known(GLIDER).expected(opened)
+    expected = store.facts(GLIDER).expected(opened)
     assert expected is not None
     return Flight(mission, list(arrivals(mission)), expected.t, back)
 

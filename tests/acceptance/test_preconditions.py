@@ -78,7 +78,12 @@ def read_only(site: Site, _: dict[str, Any]) -> None:
         pytest.skip("root writes everywhere, and may not mount here")
 
 
+def pages_below_a_root(site: Site, document: dict[str, Any]) -> None:
+    document["pages"] = {"folder": str(site.root / "pages")}
+
+
 REFUSED: dict[str, tuple[Break, str, str]] = {
+    "pages below a root": (pages_below_a_root, "pages.folder", "lies below the root"),
     "a state of a newer gliderwatch": (state(newer), "state.path", "has schema 99"),
     "another program's database": (execute("CREATE TABLE contacts (name)"), "state.path", "contacts"),
     "a database with another's number": (

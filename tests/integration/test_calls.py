@@ -65,7 +65,7 @@ class Dock:
         found = judgement.judge_log(path, self.store, lambda glider: glider == "electa")
         if found is None:
             return []
-        return list(transaction.take_log(self.store, *found, GliderParams(), SPEAKING, now).alerts)
+        return list(transaction.process_log(self.store, *found, GliderParams(), SPEAKING, now).alerts)
 
     def call(self, t: float, text: str) -> list[Alert]:
         return self.come(self.write(t, text), t + 300)
@@ -177,7 +177,7 @@ class TestWithoutFile:
 
     def test_file_that_came_by_another_way_counts(self, dock: Dock) -> None:
         with dock.store.transaction():
-            dock.store.hear(SegmentId(T0 - 6 * HOUR, "electa", "electa-2025-025-0-3"), T0 - 60.0, T0)
+            dock.store.record_sign(SegmentId(T0 - 6 * HOUR, "electa", "electa-2025-025-0-3"), T0 - 60.0, T0)
         assert dock.call(T0, status(T0) + LOST) == []
 
 
@@ -194,7 +194,7 @@ def test_order_of_arrival_does_not_matter_for_the_end(tmp_path: Path) -> None:
                 dock.come(
                     dock.write(t, status(t, "" if k == 1 else "ew33.mi", lat=61 + k) + texts[k]), T0 + 9e4
                 )
-            said = store.said("electa")
+            said = store.notified("electa")
             ends.add((tuple(e.cleared is None for e in said.aborts), said.empty is not None))
             aborts = [a for a in store.alerts() if a.title == "electa ABORTED: leak"]
             assert len(aborts) == 1
@@ -241,19 +241,19 @@ class TestAnnouncedFiles:
 
     def test_one_that_never_came_is_named_an_hour_later(self, dock: Dock) -> None:
         dock.call(T0, status(T0) + self.BOTH)
-        known = dock.store.known("electa")
+        known = dock.store.facts("electa")
         assert known.not_come(T0 - HOUR, T0 + 0.5 * HOUR) == ()
         assert known.not_come(T0 - HOUR, T0 + 2 * HOUR) == ((T0, "01030033.scd"),)
 
     def test_one_that_came_under_its_full_name_is_not(self, dock: Dock) -> None:
         dock.call(T0, status(T0) + self.BOTH)
-        dock.store.hear(SegmentId(T0 - 4 * HOUR, "electa", "electa-2025-022-0-33"), None, T0 + 100)
-        assert dock.store.known("electa").not_come(T0 - HOUR, T0 + 2 * HOUR) == ()
+        dock.store.record_sign(SegmentId(T0 - 4 * HOUR, "electa", "electa-2025-022-0-33"), None, T0 + 100)
+        assert dock.store.facts("electa").not_come(T0 - HOUR, T0 + 2 * HOUR) == ()
 
     def test_science_files_are_not_looked_for(self, dock: Dock) -> None:
         science = self.BOTH.replace(".scd", ".tcd")
         dock.call(T0, status(T0) + science)
-        assert dock.store.known("electa").not_come(T0 - HOUR, T0 + 2 * HOUR) == ()
+        assert dock.store.facts("electa").not_come(T0 - HOUR, T0 + 2 * HOUR) == ()
 
 
 class TestAbortsThatGoOn:
@@ -273,6 +273,6 @@ class TestAbortsThatGoOn:
         ack = acknowledge_thread(first.incident, Severity.CRITICAL, "ann", "", T0 + 50 * HOUR)
         dock.store.notes.acknowledge("electa", ack)
         assert self.prompt(dock, T0 + 120 * HOUR) == []
-        said, incidents = dock.store.said("electa"), dock.store.known("electa").incidents()
+        said, incidents = dock.store.notified("electa"), dock.store.facts("electa").incidents()
         assert unacknowledged(said, incidents, dock.store.notes.acks("electa")) == frozenset()
         assert unacknowledged(said, incidents, {}) == {first.incident}

@@ -130,8 +130,8 @@ class TestNotKnownByHowMuch:
     def test_it_calls_and_so_it_is_not_overdue(self):
         store, alerts = live(LOST, LOST_CAME)
         assert not [a for a in alerts if a.kind == Kind.OVERDUE]
-        signs = store.known("unit").signs(0.0)
-        expected = store.known("unit").expected(LOST_CAME[-1])
+        signs = store.facts("unit").signs(0.0)
+        expected = store.facts("unit").expected(LOST_CAME[-1])
         assert overdue.expected_call(expected, signs, LOST_CAME[-1], None).heard == LOST_CAME[-1]
 
     def test_a_glider_that_was_overdue_has_called(self):
@@ -174,8 +174,8 @@ def test_an_archive_read_at_the_first_start_is_no_glider_at_sea():
     old = [shifted(s, -400 * DAY) for s in MISSION]
     store, alerts = live(old, [START + 1.0 * i for i in range(len(old))])
     assert not alerts
-    assert not overdue.is_at_sea(store.known("unit").signs(0.0), 3 * HOUR, START + 100.0)
-    assert overdue.next_tick((), store.known("unit"), None, START + 100.0) is None
+    assert not overdue.is_at_sea(store.facts("unit").signs(0.0), 3 * HOUR, START + 100.0)
+    assert overdue.next_tick((), store.facts("unit"), None, START + 100.0) is None
 
 
 TWICE = [replace(s, id=replace(s.id, name=f"unit-2023-318-0-{i % 12}")) for i, s in enumerate(MISSION)]
@@ -186,10 +186,10 @@ def test_old_files_that_nobody_can_read_send_no_glider_to_sea():
     store, now = Store.open(":memory:"), START + DAY
     for k in range(8):
         t = now - (8 - k) * HOUR
-        store.hear(SegmentId(t, "unit", f"unit-2023-319-0-{k}"), t + 60.0, t + 90.0)
+        store.record_sign(SegmentId(t, "unit", f"unit-2023-319-0-{k}"), t + 60.0, t + 90.0)
         old = now - 400 * DAY + k * 3 * HOUR
-        store.hear(SegmentId(old, "unit", f"unit-2022-280-0-{k}"), None, now - HOUR)
-    assert overdue.outlook(store.known("unit"), now) is None
+        store.record_sign(SegmentId(old, "unit", f"unit-2022-280-0-{k}"), None, now - HOUR)
+    assert overdue.outlook(store.facts("unit"), now) is None
 
 
 class TestOneNameTwoSegments:
@@ -211,7 +211,7 @@ class TestOneNameTwoSegments:
         store = feed([*TWICE, fuller])
         assert store.extent("unit")[0] == len(TWICE)
         assert store.segments.completeness(fuller.id) == fuller.completeness
-        assert len(store.known("unit").signs(0.0)) == len(TWICE)
+        assert len(store.facts("unit").signs(0.0)) == len(TWICE)
 
     def test_each_has_its_own_expectation(self):
         found = [e.after for e in feed(TWICE).forecasts("unit")]
@@ -235,6 +235,6 @@ def test_a_state_file_of_schema_4_is_taken_on(tmp_path):
     old.close()
     store = Store.open(path)
     assert store.extent("unit")[0] == 15
-    assert [s.at for s in store.known("unit").signs(0.0)] == [7.0] * 15
+    assert [s.at for s in store.facts("unit").signs(0.0)] == [7.0] * 15
     assert ending(feed(segments[15:], store=store), "unit") == ending(feed(segments), "unit")
     assert store.segments.resume(SegmentId(float("inf"), "unit", ""))[1] == []

@@ -47,7 +47,7 @@ def call(folder: Path, store: Store, t: float, lines: str) -> list[Alert]:
     path.write_text(text, encoding="utf-8")
     found = judgement.judge_log(path, store, lambda glider: True)
     assert found is not None
-    return list(transaction.take_log(store, *found, GliderParams(), ROUTING, t + 60).alerts)
+    return list(transaction.process_log(store, *found, GliderParams(), ROUTING, t + 60).alerts)
 
 
 def leak(volts: float) -> str:

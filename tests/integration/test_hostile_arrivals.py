@@ -50,11 +50,11 @@ class Shore:
             try:
                 segment = decode(path, [self.caches])
             except GliderwatchError as error:
-                self.store.note(judgement.failed(job.file, error), now)
+                self.store.record(judgement.failed(job.file, error), now)
             else:
                 transaction.process_file(self.store, job.file, segment, GliderParams(), None, now)
         elif job is not None:
-            self.store.note(job, now)
+            self.store.record(job, now)
 
     def result(self) -> Result:
         """What it came to."""

@@ -123,7 +123,7 @@ def test_a_replay_knows_when_each_message_would_have_come(fleet) -> None:
     folder, _ = fleet
     store = replay(Request((folder / "gliders" / "angus",), (folder / "cache",))).store
     segments = of("angus", fleet)
-    expected = store.known("angus").expected(segments[gap(segments) - 1].last_t)
+    expected = store.facts("angus").expected(segments[gap(segments) - 1].last_t)
     assert expected is not None
     margin = max(3 * HOUR, expected.t - expected.after, 3 * expected.t_sigma) + 2400
     alerts = store.alerts()
@@ -348,7 +348,7 @@ class TestQuiet:
 
     def test_hours_as_configured(self, fleet) -> None:
         live, _, due = silent(fleet, overdue_hours=0.5)
-        expected = live.store.known("angus").expected(live.now)
+        expected = live.store.facts("angus").expected(live.now)
         assert expected is not None and due == expected.t + 0.5 * HOUR
 
     def test_an_archive_cries_no_wolf(self, fleet) -> None:
@@ -385,7 +385,9 @@ def test_a_glider_that_calls_and_sends_no_file_is_not_overdue(
                 call = Call("angus", f"{k}.log", t, t + 200, over=True, mission="a.mi", mission_t=t)
                 file = File(f"/{k}.log", 1, 1, Status.TAKEN, "angus")
                 dialog = Dialog(call)
-                taken = transaction.take_log(live.store, file, dialog, GliderParams(), live.speaking, t + 200)
+                taken = transaction.process_log(
+                    live.store, file, dialog, GliderParams(), live.speaking, t + 200
+                )
                 said |= {str(a.kind) for a in taken.alerts}
             live.now = t + 200
         return said

@@ -153,7 +153,7 @@ def test_an_incident_that_is_over_goes_with_what_was_said_of_it(store):
     told = len(store.alerts())
     assert told == 2  # the alarm and the all-clear
     clear(store)
-    assert store.incidents("unit") == [] and store.said("unit").threads == () and store.alerts() == []
+    assert store.incidents("unit") == [] and store.notified("unit").threads == () and store.alerts() == []
     assert transaction.notify_pilots(store, "unit", PARAMS, ALL, 0.0) == ()
     assert store._db.execute("SELECT count(*) FROM outbox").fetchone()[0] == 0
 
@@ -175,7 +175,7 @@ def test_an_open_incident_keeps_all_that_is_since():
 
 
 def test_an_end_that_was_not_told_keeps_its_incident(store):
-    said = store.said("unit")
+    said = store.notified("unit")
     (thread,) = said.threads
     open_ = replace(thread, told=replace(thread.told, cleared_at=None))
     with store.transaction():
@@ -212,9 +212,9 @@ def test_files_that_are_there_or_whose_folder_is_away_stay_known(store, tmp_path
     with store.transaction():
         store._db.execute("DELETE FROM files")
         for p in paths:
-            store.note(File(str(p), 1, 1, Status.TAKEN, "unit", p.stem), CUT - 1)
-        store.note(File(str(folder / "new.sbd"), 1, 1, Status.TAKEN, "unit", "new"), CUT + 1)
-        store.note(File(str(folder / "wait.sbd"), 1, 1, Status.WAITING, "unit", "wait"), CUT - 1)
+            store.record(File(str(p), 1, 1, Status.TAKEN, "unit", p.stem), CUT - 1)
+        store.record(File(str(folder / "new.sbd"), 1, 1, Status.TAKEN, "unit", "new"), CUT + 1)
+        store.record(File(str(folder / "wait.sbd"), 1, 1, Status.WAITING, "unit", "wait"), CUT - 1)
     clear(store)
     left = {p.path.rpartition("/")[2] for p in store.files(*Status)}
     assert left == {"there.sbd", "unknown.sbd", "new.sbd", "wait.sbd"}
@@ -369,9 +369,9 @@ class TestDaily:
 def test_said_of_a_glider_without_incidents_is_left_alone(store):
     said = NotificationState(surfaced=5.0)
     with store.transaction():
-        post_alerts(store, "unit", replace(store.said("unit"), surfaced=5.0), (), lambda alert: (), 0.0)
+        post_alerts(store, "unit", replace(store.notified("unit"), surfaced=5.0), (), lambda alert: (), 0.0)
     clear(store)
-    assert store.said("unit") == said
+    assert store.notified("unit") == said
 
 
 def test_the_daemon_notes_a_file_that_is_too_late(tmp_path):

@@ -78,7 +78,7 @@ class TestOpening:
         assert path.read_bytes() == before
 
     def test_an_older_schema_is_migrated_step_by_step(self, store, path, monkeypatch):
-        store.note(file("a"), 0.0)
+        store.record(file("a"), 0.0)
         store.close()
         steps = {
             SCHEMA + 1: "CREATE TABLE extra (a INTEGER);",
@@ -114,7 +114,7 @@ class TestOpening:
         old.close()
         store = feed(made[-1:], store=Store.open(path))
         assert ending(store, "unit") == ending(feed(made), "unit")
-        assert store.known("unit").expected(1e12) == feed(made).known("unit").expected(1e12)
+        assert store.facts("unit").expected(1e12) == feed(made).facts("unit").expected(1e12)
         assert [row.alert for row in Outbox(path).due(1e9)] == [waits], "held by nothing"
 
     def test_a_state_file_that_the_first_release_wrote_is_gone_on_from(self, path):
@@ -207,11 +207,11 @@ class TestTrouble:
             store.transaction(),
         ):
             for n in range(1000):
-                store.note(file(f"file {n}"), 0.0)
+                store.record(file(f"file {n}"), 0.0)
         assert store.counts() == {} and not store._db.in_transaction
         store._db.execute("PRAGMA max_page_count = 100000")
         with store.transaction():
-            store.note(file("a"), 0.0)
+            store.record(file("a"), 0.0)
         assert store.counts() == {Status.TAKEN: 1}
 
     def test_what_cannot_be_committed_is_taken_back(self, store, monkeypatch):
@@ -226,11 +226,11 @@ class TestTrouble:
         db.fails = True
         other = Store(db, path)
         with pytest.raises(StateError, match="disk I/O error"), other.transaction():
-            other.note(file("a"), 0.0)
+            other.record(file("a"), 0.0)
         db.fails = False
         assert other.counts() == {}
         with other.transaction():
-            other.note(file("b"), 0.0)
+            other.record(file("b"), 0.0)
         assert other.counts() == {Status.TAKEN: 1}
 
     def test_a_lock_is_said(self, store, path):
@@ -255,12 +255,12 @@ class TestTrouble:
 class TestDamage:
     def test_a_whole_file_and_no_file_are_not_damaged(self, store, path):
         with store.transaction():
-            store.note(file("a"), 0.0)
+            store.record(file("a"), 0.0)
         assert maintenance.damage(path) is None and maintenance.damage(path.with_name("none")) is None
 
     def test_another_kind_of_file_an_empty_one_and_bad_pages(self, store, path):
         for n in range(500):
-            store.note(file(f"file {n}"), 0.0)
+            store.record(file(f"file {n}"), 0.0)
         store.close()
         whole = path.read_bytes()
         for bad in (b"", b"x" * 5000, whole[:5000], whole[:8192] + b"\xa5" * 8192 + whole[16384:]):
@@ -270,12 +270,12 @@ class TestDamage:
     def test_a_check_that_is_cut_short_calls_nothing_damaged(self, store, path):
         with store.transaction():
             for n in range(20_000):
-                store.note(file(f"file {n}"), 0.0)
+                store.record(file(f"file {n}"), 0.0)
         store.close()
         assert [maintenance.damage(path, seconds) for seconds in np.linspace(0.0, 0.01, 10)] == [None] * 10
 
     def test_all_of_it_is_renamed_and_a_second_time_does_not_hide_the_first(self, store, path):
-        store.note(file("a"), 0.0)  # is in the log still
+        store.record(file("a"), 0.0)  # is in the log still
         first = maintenance.set_aside(path, 0.0)
         assert first.name == path.name + ".damaged-19700101T000000Z"
         assert not list(path.parent.glob(path.name + "-*"))
@@ -305,7 +305,7 @@ class TestDamage:
         with closing(Store.open(path)) as new:
             assert [a.id for a in new.alerts()] == ["a", "c", "damaged"] and saved[1] == 2
             assert [u.alert for u in new.undelivered()] == ["c", "damaged"]
-            assert new.said("electa") == NotificationState(surfaced=5.0)
+            assert new.notified("electa") == NotificationState(surfaced=5.0)
 
 
 class TestReading:
@@ -315,12 +315,12 @@ class TestReading:
         assert not path.exists()
 
     def test_it_sees_and_cannot_write(self, store, path):
-        store.note(file("a"), 0.0)
+        store.record(file("a"), 0.0)
         reader = Store.reading(path)
         assert reader.counts() == {Status.TAKEN: 1}
         with pytest.raises(sqlite3.OperationalError, match="readonly"):
-            reader.note(file("b"), 0.0)
-        store.note(file("b"), 0.0)
+            reader.record(file("b"), 0.0)
+        store.record(file("b"), 0.0)
         assert reader.counts() == {Status.TAKEN: 2}  # beside the daemon that writes
 
 
@@ -339,7 +339,7 @@ class TestTransaction:
             (Store, "apply"),
             (Segments, "checkpoint"),
             (Segments, "thin"),
-            (Store, "keep_said"),
+            (Store, "keep_notified"),
             (Store, "post"),
         ],
     )
@@ -369,7 +369,7 @@ class TestTransaction:
             "from gliderwatch.store.state_file import File, Status, Store\n"
             "store = Store.open(Path(sys.argv[1]))\n"
             "with store.transaction():\n"
-            "    store.note(File('/x', 1, 1, Status.TAKEN), 0.0)\n"
+            "    store.record(File('/x', 1, 1, Status.TAKEN), 0.0)\n"
             "    store._db.execute('DELETE FROM assessments')\n"
             "    os._exit(9)\n"
         )
@@ -381,7 +381,7 @@ class TestTransaction:
     def test_a_reader_sees_all_of_it_or_nothing(self, store, path):
         reader = Store.reading(path)
         with store.transaction():
-            store.note(file("a"), 0.0)
+            store.record(file("a"), 0.0)
             assert reader.counts() == {}
         assert reader.counts() == {Status.TAKEN: 1}
 
@@ -389,17 +389,17 @@ class TestTransaction:
 class TestLedger:
     def test_a_file_comes_back(self, store):
         waiting = file("a", Status.WAITING, glider="g", segment="s", reason="why", crc="abc")
-        store.note(waiting, 5.0)
+        store.record(waiting, 5.0)
         assert store.file(waiting.path) == waiting and store.file("/other") is None
 
     def test_the_last_word_on_a_file_counts(self, store):
-        store.note(file("a", Status.WAITING), 1.0)
-        store.note(file("a", Status.TAKEN), 2.0)
+        store.record(file("a", Status.WAITING), 1.0)
+        store.record(file("a", Status.TAKEN), 2.0)
         assert store.counts() == {Status.TAKEN: 1}
 
     def test_files_by_status(self, store):
         for k, status in enumerate(Status):
-            store.note(file(f"{9 - k}", status), 0.0)
+            store.record(file(f"{9 - k}", status), 0.0)
         assert [f.status for f in store.files(Status.WAITING, Status.UNKNOWN)] == [
             Status.UNKNOWN,
             Status.WAITING,
@@ -488,7 +488,7 @@ class TestResults:
         assert store.incidents("electa") == [made[0], cleared]
 
     def test_a_dive_that_has_not_ended_is_no_surfacing(self, store):
-        known = store.known("electa")
+        known = store.facts("electa")
         ended = replace(SLOW, t_dive=0.0, t_surface=50.0)
         lost = replace(SLOW, t_dive=100.0, t_surface=150.0, unusable=Unusable.DATA_MISSING)
         under_way = replace(SLOW, t_dive=200.0, t_surface=250.0, unusable=Unusable.NOT_SURFACED, flag=None)
@@ -508,40 +508,40 @@ class TestSurfacings:
     def test_the_last_expected_as_known_at_a_time(self, store):
         self.expect(store, 200.0, 199.0)
         first, second = self.expect(store, 100.0, 0.0), self.expect(store, 200.0, 201.0)
-        known = store.known("electa")
+        known = store.facts("electa")
         assert [known.expected(t) for t in (99.0, 199.0, 1e9)] == [None, first, second]
-        assert store.known("other").expected(1e9) is None
+        assert store.facts("other").expected(1e9) is None
 
     def test_a_segment_that_is_taken_again_leads_to_expect_something_else(self, store):
         first = self.expect(store, 100.0, 0.0)
         self.expect(store, 200.0, 110.0)
         moved = self.expect(store, 190.0, 110.0)
-        assert store.known("electa").expected(1e9) == moved
+        assert store.facts("electa").expected(1e9) == moved
         store.segments.checkpoint(SegmentId(110.0, "electa", "electa-110"), GliderState())
-        assert store.known("electa").expected(1e9) == first
+        assert store.facts("electa").expected(1e9) == first
 
     def test_a_segment_is_heard_once_and_read_later(self, store):
         identity = SegmentId(100.0, "electa", "electa-1")
-        store.hear(identity, None, 500.0)
-        assert store.known("electa").signs(0.0) == (Sign(100.0, None, 500.0),)
-        store.hear(identity, 200.0, 900.0)
-        store.hear(identity, 150.0, 950.0)
-        assert store.known("electa").signs(0.0) == (Sign(100.0, 200.0, 500.0),)
-        assert store.known("electa").signs(500.1) == () and store.known("other").signs(0.0) == ()
+        store.record_sign(identity, None, 500.0)
+        assert store.facts("electa").signs(0.0) == (Sign(100.0, None, 500.0),)
+        store.record_sign(identity, 200.0, 900.0)
+        store.record_sign(identity, 150.0, 950.0)
+        assert store.facts("electa").signs(0.0) == (Sign(100.0, 200.0, 500.0),)
+        assert store.facts("electa").signs(500.1) == () and store.facts("other").signs(0.0) == ()
 
     def test_the_first_surfacing_after_a_time(self, store):
         ended = [replace(SLOW, t_dive=t, t_surface=t + 50) for t in (0.0, 100.0)]
         under_way = replace(SLOW, t_dive=200.0, t_surface=250.0, unusable=Unusable.NOT_SURFACED, flag=None)
         store.apply("electa", Outcome(GliderState(), float("-inf"), (*ended, under_way), (), None))
-        assert [store.known("electa").first_surfacing(t) for t in (0.0, 50.0, 150.0)] == [50.0, 150.0, None]
+        assert [store.facts("electa").first_surfacing(t) for t in (0.0, 50.0, 150.0)] == [50.0, 150.0, None]
 
 
 class TestMessages:
     def test_what_was_said_comes_back(self, store):
-        assert store.said("unit") == NotificationState()
+        assert store.notified("unit") == NotificationState()
         speaking = routing.Routing(channels=lambda a: ["mail"], notices=lambda g: True)
         feed(mission(LEGS), speaking=speaking, store=store)
-        assert store.said("unit").surfaced is not None
+        assert store.notified("unit").surfaced is not None
         assert [a.kind for a in store.alerts()] == ["surfacing"] * 6
 
     def test_a_message_is_kept_once(self, store):
@@ -604,10 +604,10 @@ class TestOutbox:
         """The dispatcher's thread and the daemon's write in turn."""
         outbox = self.made(store, path, alert())
         with store.transaction():
-            store.note(file("a"), 0.0)
+            store.record(file("a"), 0.0)
         outbox.delivered(outbox.due(0.0)[0].id, 0.0)
         with store.transaction():
-            store.note(file("b"), 0.0)
+            store.record(file("b"), 0.0)
         outbox.close()
         assert store.undelivered() == []
 

@@ -146,7 +146,9 @@ def test_no_message_twice_in_any_order(there):
     assert len(ids) == len(set(ids)) == len(store.undelivered())
     assert_same(ending(store, "unit"), ending(feed(whole, EAGER), "unit"))
     open_now = {i.id for i in store.incidents("unit") if i.cleared_at is None}
-    told = {t.told.id for t in store.said("unit").threads if not t.withdrawn and t.told.cleared_at is None}
+    told = {
+        t.told.id for t in store.notified("unit").threads if not t.withdrawn and t.told.cleared_at is None
+    }
     assert told == open_now
 
 

@@ -52,13 +52,13 @@ def noted(path: Path, store: Store, *caches: Path, known: bool = True) -> File:
     """A judgement that is a row, written to the ledger."""
     found = judge(path, store, *caches, known=known)
     assert isinstance(found, File)
-    store.note(found, 0.0)
+    store.record(found, 0.0)
     return found
 
 
 def take(job: Job | File | None, store: Store, status: Status = Status.TAKEN) -> None:
     assert isinstance(job, Job)
-    store.note(replace(job.file, status=status), 0.0)
+    store.record(replace(job.file, status=status), 0.0)
 
 
 def test_a_new_file_is_to_be_decoded(path: Path, cache: Path, store: Store) -> None:
@@ -117,7 +117,7 @@ def test_a_file_that_could_not_be_decoded_for_now_is_tried_again(
 ) -> None:
     job = judge(path, store, cache)
     assert isinstance(job, Job)
-    store.note(judgement.failed(job.file, Retry("the share is away")), 0.0)
+    store.record(judgement.failed(job.file, Retry("the share is away")), 0.0)
     assert isinstance(judge(path, store, cache), Job)
 
 

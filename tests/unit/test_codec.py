@@ -93,7 +93,7 @@ def test_a_row_whose_text_is_broken_is_damage(text):
 
 @pytest.mark.parametrize(
     "data",
-    [3, {"navigation": 3}, {"last": {"glider": "unit"}}, {"memory": {"estimate": {"joint": "none"}}}],
+    [3, {"navigation": 3}, {"last": {"glider": "unit"}}, {"memory": {"estimate": {"speed": "none"}}}],
 )
 def test_whole_json_of_another_type_is_a_mistake_of_the_program_and_no_damage(data):
     """A field that was renamed without a converter must not set a good state file aside."""

@@ -214,7 +214,7 @@ def test_a_migration_converts_the_text_of_rows(tmp_path, monkeypatch):
     monkeypatch.setattr(
         database, "MIGRATIONS", {database.SCHEMA: "UPDATE said SET data = said_of_old(data);"}
     )
-    assert Store.open(path).said("unit") == NotificationState(surfaced=5.5)
+    assert Store.open(path).notified("unit") == NotificationState(surfaced=5.5)
 
 
 def test_a_migration_whose_converter_fails_changes_nothing(tmp_path, monkeypatch):

@@ -7,7 +7,7 @@ import pytest
 from gliderwatch.forecast.surfacing import Surfacings, expect, learn
 from gliderwatch.model import Fix, NextSurfacing, Unusable
 from gliderwatch.navigation.geodesy import from_plane, to_plane
-from joint_support import DAY, HOUR, LAT, LON, START, Way, dive, mission
+from joint_support import HOUR, LAT, LON, START, Way, dive, mission
 
 SPEED, SIGMA = 0.25, 0.005
 PERIOD = 3 * HOUR + 600
@@ -85,14 +85,6 @@ def test_hours_without_data_are_no_interval():
     expected = expect(after([*dives[:5], late]), SPEED, SIGMA, steady())
     assert expected.after == late.end.t
     assert expected.t - expected.after == pytest.approx(PERIOD)
-
-
-def test_a_new_deployment_begins_anew():
-    far = Fix(START + 30 * DAY, LAT + 3, LON)
-    there = replace(dive(0, Way(), start=far), t_dive=far.t, t_surface=far.t + 3 * HOUR)
-    there = replace(there, start=far, end=Fix(far.t + 3 * HOUR, far.lat, far.lon))
-    state = learn(after(mission([Way()] * 6)), there, None)
-    assert state == learn(Surfacings(), there, None)
 
 
 def test_a_dive_taken_again_is_a_fold():

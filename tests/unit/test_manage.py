@@ -312,7 +312,12 @@ class TestWaiting:
         with closing(Store.open(Path(config.state.path))) as store:
             correction = [alert("a2", kind=Kind.CORRECTION)]
             post_alerts(
-                store, "electa", store.said("electa"), correction, lambda a: {"sms": [Wait(after=1.0)]}, NOW
+                store,
+                "electa",
+                store.notified("electa"),
+                correction,
+                lambda a: {"sms": [Wait(after=1.0)]},
+                NOW,
             )
         assert self.waiting(config) == [("a1", "mail"), ("n", "post")]
 

@@ -31,6 +31,8 @@ from gliderwatch.store import outbox
 from gliderwatch.store.state_file import File, Status, Store
 from gliderwatch.store.watch_health import Failing, Waiting
 
+MACHINE = socket.gethostname()
+
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 NOW = 1_800_000_000.0
 LIMITS = schema.Operator()
@@ -116,7 +118,7 @@ def test_files_and_flags_are_counted(state: Path) -> None:
 def test_last_files_are_known_after_a_restart_and_forgotten_with_the_glider(
     state: Path, store: Store
 ) -> None:
-    store.hear(segment("electa"), None, NOW)
+    store.record_sign(segment("electa"), None, NOW)
     metrics = Metrics(state, config(state))
     assert sample(metrics, "last_file_timestamp_seconds", glider="electa") == NOW
     metrics.forget(config(state, gliders={"sam": None}))
@@ -279,12 +281,12 @@ def test_a_trouble_is_told_once_also_over_a_restart_and_so_is_its_end(state: Pat
     assert "no file of any glider for 25.0 h" in told.title
     assert first.look(settings, settings.operator, NOW + 26 * HOUR, 26 * HOUR) == ()
 
-    store.hear(segment("sam"), None, NOW)
+    store.record_sign(segment("sam"), None, NOW)
     second = Operator(store, state, settings, NOW + 27 * HOUR, 0.0)
     assert second.look(settings, settings.operator, NOW + 27 * HOUR, 0.0) == (), "said before the restart"
     second.came("sam", 10.0)
     (over,) = second.look(settings, settings.operator, NOW + 27 * HOUR, 10.0)
-    assert "files come again" in over.title
+    assert "files of the gliders come again" in over.title
     assert over.severity is Severity.INFO
     assert (over.id, over.incident) == (told.id + "/over", told.incident)
     third = Operator(store, state, settings, NOW + 28 * HOUR, 0.0)
@@ -311,47 +313,47 @@ def test_files_quarantined_within_a_day_count(state: Path, store: Store) -> None
     settings = config(state, operator={"free_mb": None, "quarantined_per_day": 2})
     operator = Operator(store, state, settings, NOW, 0.0)
     for i, age in enumerate((25, 23, 1)):
-        store.note(File(f"/{i}", 1, 1, Status.QUARANTINED), NOW - age * HOUR)
+        store.record(File(f"/{i}", 1, 1, Status.QUARANTINED), NOW - age * HOUR)
     assert operator.look(settings, settings.operator, NOW, 0.0) == ()
-    store.note(File("/more", 1, 1, Status.QUARANTINED), NOW)
+    store.record(File("/more", 1, 1, Status.QUARANTINED), NOW)
     (told,) = operator.look(settings, settings.operator, NOW, 0.0)
-    assert "3 files of no known glider quarantined in 24 h" in told.title
+    assert "3 files of no known glider quarantined in" in told.title
 
 
 def test_files_of_one_glider_that_wait_are_a_trouble_until_they_are_taken(state: Path, store: Store) -> None:
     settings = config(state, operator={"free_mb": None})
     operator = Operator(store, state, settings, NOW, 0.0)
     lacks = File("/a", 1, 1, Status.WAITING, "sam", "s", "cache file ab.cac is missing: not in /c", "ab")
-    store.note(replace(lacks, hindrance=Hindrance.NO_CACHE), NOW)
-    store.note(replace(lacks, path="/b", hindrance=Hindrance.NO_CACHE), NOW + 5 * HOUR)
+    store.record(replace(lacks, hindrance=Hindrance.NO_CACHE), NOW)
+    store.record(replace(lacks, path="/b", hindrance=Hindrance.NO_CACHE), NOW + 5 * HOUR)
     gone = replace(lacks, path="/c", glider="electa", crc="", hindrance=Hindrance.GONE)
-    store.note(gone, NOW)
+    store.record(gone, NOW)
     operator.came("sam", 5 * HOUR)
     assert operator.look(settings, settings.operator, NOW + 5.9 * HOUR, 5.9 * HOUR) == ()
     (told,) = operator.look(settings, settings.operator, NOW + 6.1 * HOUR, 6.1 * HOUR)
-    assert told.title == "GLIDERWATCH: files of sam have waited for 6.1 h"
+    assert told.title == f"GLIDERWATCH {MACHINE}: files of sam have waited for 6.1 h"
     assert "2 wait; the oldest since" in told.body and "ab.cac is missing: not in /c" in told.body
     for path in ("/a", "/b"):
-        store.note(File(path, 1, 1, Status.TAKEN, "sam", "s"), NOW + 7 * HOUR)
+        store.record(File(path, 1, 1, Status.TAKEN, "sam", "s"), NOW + 7 * HOUR)
     (over,) = operator.look(settings, settings.operator, NOW + 7 * HOUR, 7 * HOUR)
-    assert over.title == "GLIDERWATCH: no files of sam wait any more"
+    assert over.title == f"GLIDERWATCH {MACHINE}: no files of sam wait any more"
 
 
 def test_one_glider_is_missed_while_another_calls(state: Path, store: Store) -> None:
     """Of its own limit, though files of the fleet come all the time; not in a mute."""
     settings = config(state, operator={"free_mb": None})
     for k in range(4):
-        store.hear(SegmentId(NOW + 3 * k * HOUR, "sam", f"s{k}"), None, NOW + 3 * k * HOUR)
+        store.record_sign(SegmentId(NOW + 3 * k * HOUR, "sam", f"s{k}"), None, NOW + 3 * k * HOUR)
     operator = Operator(store, state, settings, NOW + 9 * HOUR, 9 * HOUR)
     found = []
     for hour in range(10, 40, 3):
         operator.came("electa", hour * HOUR)
         found += operator.look(settings, settings.operator, NOW + hour * HOUR, hour * HOUR)
     (told,) = found
-    assert told.title == "GLIDERWATCH: no file of sam for 25.0 h"
+    assert told.title == f"GLIDERWATCH {MACHINE}: no file of sam for 25.0 h"
     operator.came("sam", 40 * HOUR)
     (over,) = operator.look(settings, settings.operator, NOW + 40 * HOUR, 40 * HOUR)
-    assert over.title == "GLIDERWATCH: files of sam come again"
+    assert over.title == f"GLIDERWATCH {MACHINE}: files of sam come again"
 
 
 def test_a_channel_that_fails_is_told_by_the_others_and_silences_the_heartbeat_with_the_last(
@@ -377,8 +379,8 @@ def test_a_channel_that_fails_is_told_by_the_others_and_silences_the_heartbeat_w
         rows.delivered(row, NOW + 4 * HOUR)
     ended = operator.look(settings, settings.operator, NOW + 4 * HOUR, 0.0)
     assert sorted(a.title for a in ended) == [
-        "GLIDERWATCH: channel mail does not fail any more",
-        "GLIDERWATCH: channel slack does not fail any more",
+        f"GLIDERWATCH {MACHINE}: channel mail does not fail any more",
+        f"GLIDERWATCH {MACHINE}: channel slack does not fail any more",
     ]
     assert not operator.is_unheard(settings)
     rows.close()

@@ -22,7 +22,13 @@ if TYPE_CHECKING:
     from gliderwatch.store.state_file import Store
 
 _ALL = 1_000_000
-only_config_option = click.option("-c", "--config", "config_path", type=FILE, help="The YAML configuration.")
+only_config_option = click.option(
+    "-c",
+    "--config",
+    "config_path",
+    type=FILE,
+    help=f"The YAML configuration; {DEFAULT} where no --state is named.",
+)
 state_option = click.option(
     "--state", type=FILE, help="A state file, as a replay leaves; else the service's."
 )

@@ -16,7 +16,7 @@ from gliderwatch.errors import ConfigError
 @click.command(
     epilog=example(
         "gliderwatch field upper --out upper.nc",
-        "gliderwatch field upper --at 2026-05-03 --state results/replay.sqlite --out upper.nc",
+        "gliderwatch field upper --at 2026-05-03 --out upper.nc",
     )
 )
 @click.argument("name")

@@ -24,11 +24,13 @@ SAMPLES = (
     "unknown",
     "abort",
     "call",
+    "health",
     "neighbours",
     "all_clear",
     "reminder",
     "correction",
     "regime",
+    "acknowledged",
     "surfacing",
     "operator",
 )

@@ -179,7 +179,7 @@ def rebuild(
                 work = _Work(config, name, old, new)
                 _fill(work, maintenance.paths(db, name), maintenance.held(db, name), on_step)
                 change = compare(name, old, new, (work.files, work.held), work.problems)
-                said = as_notified(old.said(name), new.known(name))
+                said = as_notified(old.notified(name), new.facts(name))
         if keep:
             with closing(connect(path)) as state, Store(state, path).guarded():
                 maintenance.replace(state, place, name, said)

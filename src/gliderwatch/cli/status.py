@@ -77,7 +77,7 @@ def _of(store: Store, glider: str, every: bool) -> list[IncidentEntry]:
     acks = store.notes.acks(glider)
     found = (i for i in store.incidents(glider) if every or i.cleared_at is None)
     entries = [IncidentEntry(i, acks.get(i.id)) for i in found]
-    return entries + [IncidentEntry(t, acks.get(t.id)) for t in open_threads(store.said(glider))]
+    return entries + [IncidentEntry(t, acks.get(t.id)) for t in open_threads(store.notified(glider))]
 
 
 def acknowledge_incident(
@@ -316,7 +316,7 @@ def overview(config: Config) -> Overview:
 
 def _glider(store: Store, name: str, config: Config, now: float) -> GliderStatus:
     segments, dives = store.extent(name)
-    known = store.known(name)
+    known = store.facts(name)
     latest = known.last_surfacing(float("inf"))
     incidents = tuple(i for i in store.incidents(name) if i.cleared_at is None)
     attention = with_mute(config.attention(name), store.notes.muted_until(name))
@@ -341,7 +341,7 @@ def _glider(store: Store, name: str, config: Config, now: float) -> GliderStatus
         call,
         acks,
         recent,
-        open_threads(store.said(name)),
+        open_threads(store.notified(name)),
         known.not_come(now - GONE, now),
         _news(known.calls(now - GONE), latest),
     )

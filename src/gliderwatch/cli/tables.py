@@ -272,15 +272,16 @@ _STYLE = {Severity.INFO: "cyan", Severity.WARNING: "yellow", Severity.CRITICAL: 
 
 
 def show_alert(alert: Alert, console: Console) -> None:
-    """Print an alert in a frame: title, what and how bad, the facts; not its lists of remarks and checks.
+    """Print an alert in a frame: title, what and how bad, what to do, the map; not its numbers and remarks.
 
     Texts are printed as they are: brackets in a name are no markup.
     """
     style = "green" if alert.kind is Kind.ALL_CLEAR else _STYLE[alert.severity]
     blocks = alert.body.strip().split("\n\n")
+    maps = [line for line in alert.body.splitlines() if line.startswith("Map: ")]
     console.print(
         Panel(
-            Text("\n\n".join(blocks[:2])),
+            Text("\n\n".join([*blocks[:2], *maps])),
             title=Text(alert.title, style=style),
             subtitle=Text(f"{utc(alert.time)}  {alert.kind}", style="dim"),
             title_align="left",

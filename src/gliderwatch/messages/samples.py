@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from gliderwatch.fleet.cross_check import Fault, Hypothesis
+from gliderwatch.health.rule import Finding
 from gliderwatch.incidents.notices import (
     Aborted,
     AbortReport,
@@ -23,6 +24,8 @@ from gliderwatch.incidents.notices import (
     DiffersFromNeighbours,
     DriftEllipse,
     Fleet,
+    HealthFound,
+    HealthIncident,
     NewRegime,
     Notice,
     Opened,
@@ -254,6 +257,15 @@ def _operator(now: float) -> Alert:
     )
 
 
+def _health(now: float) -> Alert:
+    leak = tuple((now - k * _HOUR, volts) for k, volts in ((8, 2.49), (4, 2.41), (0, 1.86)))
+    text = "leak detector at 1.860 V, twice in a row below 2.000 V"
+    found = Finding("leak", Severity.CRITICAL, now, text, "leak_voltage", leak)
+    incident = HealthIncident("", GLIDER, "leak", Severity.CRITICAL, now, now, None, found, found)
+    content = HealthFound(incident, False, Fix(now, 24.21, -83.01))
+    return _message(Kind.HEALTH, Severity.CRITICAL, now, content)
+
+
 SAMPLES: dict[Kind, Callable[[float], Alert]] = {
     Kind.ANOMALY: _opened(Kind.ANOMALY, _SLOW, Severity.CRITICAL),
     Kind.FALSE_ALARM: _opened(Kind.FALSE_ALARM, _DISAGREE, Severity.WARNING),
@@ -261,6 +273,7 @@ SAMPLES: dict[Kind, Callable[[float], Alert]] = {
     Kind.UNKNOWN: _unknown,
     Kind.ABORT: _abort,
     Kind.CALL: _without_file,
+    Kind.HEALTH: _health,
     Kind.NEIGHBOURS: _neighbours,
     Kind.ALL_CLEAR: _all_clear,
     Kind.REMINDER: _reminder,

@@ -28,7 +28,7 @@ def read_glider(
 
     Raises StateError where the state file cannot be read.
     """
-    known = store.known(name)
+    known = store.facts(name)
     attention = with_mute(attention, store.notes.muted_until(name))
     found = outlook(known, now)
     expected = known.expected(now) if found is None else found[0]
@@ -48,7 +48,7 @@ def read_glider(
         calls=calls[-20:],
         log=_tail(known.last_log()) if whole else "",
         alerts=known.latest_alerts(ALERTS) if whole else (),
-        said=store.said(name),
+        said=store.notified(name),
         waypoint=call.waypoint if call is not None else None,
     )
 
@@ -62,7 +62,7 @@ def read_fleet(
 
 def last_news(store: Store) -> float | None:
     """When the last dive of any glider ended (s): the time of a state file that is over; None: no dive."""
-    found = (store.known(name).last_surfacing(float("inf")) for name in store.gliders())
+    found = (store.facts(name).last_surfacing(float("inf")) for name in store.gliders())
     return max((dive.t_surface for dive in found if dive is not None), default=None)
 
 

@@ -122,7 +122,7 @@ def _soundings(segment: Segment) -> Array:
 
 def _leg(store: Store, glider: str, state: GliderState) -> tuple[float, Leg] | None:
     """The last surfacing of a glider (s), and what it can do until the next one; None: that is not known."""
-    last, outlook = store.known(glider).last_surfacing(inf), look_ahead(state.memory.estimate, None)
+    last, outlook = store.facts(glider).last_surfacing(inf), look_ahead(state.memory.estimate, None)
     if last is None or last.lat is None or last.lon is None or outlook is None:
         return None
     expected, t = state.memory.expected, last.t_surface
@@ -154,7 +154,7 @@ def _others(store: Store, glider: str, t: float) -> tuple[tuple[Point, ...], lis
     """Where other gliders come up next, or came up last, and the legs that they fly, at a time (s)."""
     ends, legs = list[Point](), list[tuple[Leg, float]]()
     for other in store.gliders():
-        known = store.known(other)
+        known = store.facts(other)
         last = known.last_surfacing(inf)
         if other == glider or last is None or last.lat is None or last.lon is None:
             continue

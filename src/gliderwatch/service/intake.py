@@ -282,7 +282,7 @@ class Intake:
         file, dialog = found
         params, routing = self._runtime.config.glider(file.glider), self._routing_if_last(file.glider)
         before = self._store.file(file.path)
-        taken = transaction.take_log(self._store, file, dialog, params, routing, time.time())
+        taken = transaction.process_log(self._store, file, dialog, params, routing, time.time())
         if before is None or before.status != file.status:  # not once for each line that comes
             self._report(taken)
         else:
@@ -373,7 +373,7 @@ class Intake:
         """Whether it was reported overdue: then a file may be the first of several that come at once."""
         now, waiting = time.monotonic(), self._returned.get(glider)
         if waiting is None:
-            silences = self._store.said(glider).silences
+            silences = self._store.notified(glider).silences
             if not any(s.called is None and s.messages for s in silences):
                 return False
         end = now + LONGEST if waiting is None else waiting[1]

@@ -147,7 +147,7 @@ class Metrics:
 
 def _is_overdue(store: Store, config: Config, glider: str, now: float) -> bool:
     """As `gliderwatch status` says."""
-    known, settings = store.known(glider), config.gliders[glider]
+    known, settings = store.facts(glider), config.gliders[glider]
     expected = known.expected(now)
     if expected is None or settings.recovered:
         return False

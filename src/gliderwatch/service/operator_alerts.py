@@ -203,7 +203,7 @@ class Operator:
             if silent < (config.operator.silent_hours or 0.0) * HOUR or silent > GONE:
                 continue  # the look into the state is for the few that are silent
             attention = with_mute(config.attention(name), self._store.notes.muted_until(name))
-            found = None if attention.is_quiet(now) else outlook(self._store.known(name), now)
+            found = None if attention.is_quiet(now) else outlook(self._store.facts(name), now)
             if found is not None and silent > 2 * (found[0].t - found[0].after):
                 missed[name] = silent
         return missed

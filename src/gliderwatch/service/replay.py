@@ -450,7 +450,7 @@ def _process_log(
     """Let the clock run until a call was over, and take its log."""
     glider, is_read = log.file.glider, log.file.status is Status.TAKEN
     ticked = _tick(report, routing, log.sent) if is_read else []
-    outcome = transaction.take_log(
+    outcome = transaction.process_log(
         report.store, log.file, log.dialog, request.params(glider), routing, log.sent
     )
     if is_read:

@@ -104,7 +104,7 @@ def post_alert(
 def post_alerts(
     store: Store,
     glider: str,
-    said: NotificationState,
+    notified: NotificationState,
     alerts: Iterable[Alert],
     channels: Channels,
     now: float,
@@ -113,7 +113,7 @@ def post_alerts(
 
     What is held of incidents that are over by then is withdrawn (`withdraw_answered`).
     """
-    store.keep_said(glider, said)
+    store.keep_notified(glider, notified)
     open_threads = withdraw_answered(store, glider, now)
     for alert in alerts:
         post_alert(store, alert, channels(alert), now, open_threads)
@@ -126,7 +126,7 @@ def withdraw_answered(store: Store, glider: str, now: float, *, quiet: bool = Fa
     """
     open_threads = frozenset[str]()
     if not quiet:
-        incidents, acks = store.known(glider).incidents(), store.notes.acks(glider)
-        open_threads = unacknowledged(store.said(glider), incidents, acks)
+        incidents, acks = store.facts(glider).incidents(), store.notes.acks(glider)
+        open_threads = unacknowledged(store.notified(glider), incidents, acks)
     store.withdraw(glider, open_threads, now)
     return open_threads

@@ -60,114 +60,113 @@ def process_file(
     file: File,
     segment: Segment,
     params: GliderParams,
-    speaking: Routing | None,
+    routing: Routing | None,
     now: float,
     stopping: Callable[[], bool] = lambda: False,
     ocean: Field | None = None,
     fields: Sequence[FleetField] = (),
     layers: GliderLayers | None = None,
 ) -> FileOutcome:
-    """Put a segment in its place and go on from the checkpoint before it; say what is to be said.
+    """Put a segment in its place and go on from the checkpoint before it; make the messages that are due.
 
-    A copy that holds no more than the one known is only noted. `speaking` is None while more files of the
-    glider are at hand: then the last of them speaks for all. `now` (s) is when the file came; `ocean` is a
-    model's field, where dives are compared with one; `fields` are those that the gliders measure,
-    `layers` says what is to be done about layers of the sea.
+    A copy that holds no more than the one that is held is only recorded. `routing` is None while more files
+    of the glider are at hand: then the last of them speaks for all. `now` (s) is when the file came;
+    `ocean` is a model's field, where dives are compared with one; `fields` are those that the gliders
+    measure, `layers` says what is to be done about layers of the sea.
     Raises Quarantine for a segment that cannot be assessed, StoppedError once `stopping` holds; then
     nothing has changed.
     """
     glider = segment.id.glider
     with store.transaction():
-        store.hear(segment.id, segment.last_t, now)
-        known = store.segments.completeness(segment.id)
-        if known is not None and known >= segment.completeness:
+        store.record_sign(segment.id, segment.last_t, now)
+        held = store.segments.completeness(segment.id)
+        if held is not None and held >= segment.completeness:
             file = replace(file, status=Status.DUPLICATE, reason="this segment is known from a fuller copy")
-            store.note(file, now)
-            return FileOutcome(file, alerts=_due_messages(store, glider, params, speaking, now))
+            store.record(file, now)
+            return FileOutcome(file, alerts=_due_messages(store, glider, params, routing, now))
         file = replace(file, status=Status.TAKEN, reason="")
-        store.note(file, now)
+        store.record(file, now)
         assessments, state = _run(store, segment, params, stopping, ocean, layers)
         right = moved(segment, store.segments.offset(segment.id))  # by a clock that is right
         store.health.put(glider, right.id.name, right.last_t, of_segment(right))
         if fields:
             take(store, fields, store.segments.kept(segment.id))
-        advice = look(store, fields, glider, state) if speaking is not None else ()
-        alerts = _due_messages(store, glider, params, speaking, now)
-        deep = layers_of_sea.newest(store, glider) if layers is not None and speaking is not None else None
+        advice = look(store, fields, glider, state) if routing is not None else ()
+        alerts = _due_messages(store, glider, params, routing, now)
+        deep = layers_of_sea.newest(store, glider) if layers is not None and routing is not None else None
     return FileOutcome(file, assessments, alerts, advice, deep)
 
 
 def record_file(
-    store: Store, file: File, params: GliderParams, speaking: Routing | None, now: float
+    store: Store, file: File, params: GliderParams, routing: Routing | None, now: float
 ) -> FileOutcome:
-    """Write down a file that cannot be taken (now); say what earlier files of its glider left to be said.
+    """Write down a file that cannot be taken (now); make the messages that earlier files of its glider
+    left.
 
     It is a sign of life all the same, if its header tells of what.
     """
     with store.transaction():
-        store.note(file, now)
+        store.record(file, now)
         if file.opened_at is not None and file.status != Status.UNKNOWN:
-            store.hear(SegmentId(file.opened_at, file.glider, file.segment), None, now)
-        alerts = _due_messages(store, file.glider, params, speaking, now) if file.glider else ()
+            store.record_sign(SegmentId(file.opened_at, file.glider, file.segment), None, now)
+        alerts = _due_messages(store, file.glider, params, routing, now) if file.glider else ()
     return FileOutcome(file, alerts=alerts)
 
 
-def take_log(
+def process_log(
     store: Store,
     file: File,
     dialog: Dialog | None,
     params: GliderParams,
-    speaking: Routing | None,
+    routing: Routing | None,
     now: float,
 ) -> FileOutcome:
-    """Keep what the log of a call tells by `now` (s), and say what is to be said.
+    """Keep what the log of a call tells by `now` (s), and make the messages that are due.
 
     `dialog` is None where the log could not be read.
     """
     with store.transaction():
-        store.note(file, now)
+        store.record(file, now)
         if dialog is not None:
             store.calls.keep(file.path, dialog.call, plain_encode(dialog), now)
             call = dialog.call
             if call.glider:
                 store.health.put(call.glider, file.path, call.last_t, of_call(call))
         alerts = (
-            _due_messages(store, file.glider, params, speaking, now) if file.status is Status.TAKEN else ()
+            _due_messages(store, file.glider, params, routing, now) if file.status is Status.TAKEN else ()
         )
     return FileOutcome(file, alerts=alerts)
 
 
 def notify_pilots(
-    store: Store, glider: str, params: GliderParams, speaking: Routing, now: float
+    store: Store, glider: str, params: GliderParams, routing: Routing, now: float
 ) -> tuple[Alert, ...]:
     """Say what is to be said of a glider without any new input: after a start or a new configuration."""
     with store.transaction():
-        return _due_messages(store, glider, params, speaking, now)
+        return _due_messages(store, glider, params, routing, now)
 
 
-def tick(
-    store: Store, glider: str, speaking: Routing, others: Iterable[str], now: float
-) -> tuple[Alert, ...]:
+def tick(store: Store, glider: str, routing: Routing, others: Iterable[str], now: float) -> tuple[Alert, ...]:
     """Say that a glider is overdue, if it is at `now` (s); `others` are watched as well."""
-    due_at = next_tick(store, glider, speaking, now)
+    due_at = next_tick(store, glider, routing, now)
     if due_at is None or due_at > now:
         return ()
     with store.transaction():
-        said, hours = store.said(glider), speaking.attention(glider).overdue_hours
-        fleet = replace(_fleet(store, others, now), back=_back(store, said.silences))
-        silences, due = overdue.tick(said.silences, store.known(glider), fleet, hours, now)
+        notified, hours = store.notified(glider), routing.attention(glider).overdue_hours
+        fleet = replace(_fleet(store, others, now), back=_back(store, notified.silences))
+        silences, due = overdue.tick(notified.silences, store.facts(glider), fleet, hours, now)
         alerts = tuple(map(render, due))
-        if silences != said.silences:
-            channels = _channels(store, silences, speaking)
-            post_alerts(store, glider, replace(said, silences=silences), alerts, channels, now)
+        if silences != notified.silences:
+            channels = _channels(store, silences, routing)
+            post_alerts(store, glider, replace(notified, silences=silences), alerts, channels, now)
     return alerts
 
 
 def _fleet(store: Store, others: Iterable[str], now: float) -> Fleet:
     """How the others at sea are, and whether a message about one of them was for all."""
-    outlooks = {other: overdue.outlook(store.known(other), now) for other in others}
+    outlooks = {other: overdue.outlook(store.facts(other), now) for other in others}
     at_sea = {o: x for o, x in outlooks.items() if x is not None and overdue.fleet([x], now).others}
-    shore = (s.id for o in at_sea for s in store.said(o).silences if s.called is None and s.shore == s.id)
+    shore = (s.id for o in at_sea for s in store.notified(o).silences if s.called is None and s.shore == s.id)
     found = overdue.fleet(at_sea.values(), now)
     return replace(found, names=tuple(sorted(at_sea)), shore=next(shore, ""))
 
@@ -178,23 +177,23 @@ def _back(store: Store, silences: Iterable[overdue.Silence]) -> float | None:
     shores = {s.shore for s in silences if s.shore and s.called is None}
     if not shores:
         return None
-    fleet = (s for other in store.gliders() for s in store.said(other).silences if s.shore in shores)
+    fleet = (s for other in store.gliders() for s in store.notified(other).silences if s.shore in shores)
     return min((s.called for s in fleet if s.called is not None), default=None)
 
 
 def _channels(
-    store: Store, silences: Iterable[overdue.Silence], speaking: Routing
+    store: Store, silences: Iterable[overdue.Silence], routing: Routing
 ) -> Callable[[Alert], Iterable[str]]:
     """The channels of an alert; of one that is for all gliders, those of the alerts of each."""
     for_all = {s.id for s in silences if s.shore == s.id}
 
     def channels(alert: Alert) -> Iterable[str]:
         if alert.incident not in for_all:
-            return speaking.channels(alert)
+            return routing.channels(alert)
         merged: dict[str, list[Wait]] = {}
         for glider in store.gliders():
-            if not speaking.attention(glider).recovered:
-                found = speaking.channels(replace(alert, glider=glider))
+            if not routing.attention(glider).recovered:
+                found = routing.channels(replace(alert, glider=glider))
                 waits = found if isinstance(found, Mapping) else dict.fromkeys(found, AT_ONCE)
                 for name, wait in waits.items():
                     merged.setdefault(name, []).extend(wait)
@@ -203,14 +202,14 @@ def _channels(
     return channels
 
 
-def next_tick(store: Store, glider: str, speaking: Routing, now: float) -> float | None:
+def next_tick(store: Store, glider: str, routing: Routing, now: float) -> float | None:
     """When `tick` has something to say of a glider next (s), None: never."""
-    attention = with_mute(speaking.attention(glider), store.notes.muted_until(glider))
+    attention = with_mute(routing.attention(glider), store.notes.muted_until(glider))
     if attention.recovered:
         return None
-    silences = store.said(glider).silences
-    known, hours = store.known(glider), attention.overdue_hours
-    at = overdue.next_tick(silences, known, hours, now, _back(store, silences))
+    silences = store.notified(glider).silences
+    facts, hours = store.facts(glider), attention.overdue_hours
+    at = overdue.next_tick(silences, facts, hours, now, _back(store, silences))
     return at if at is None or attention.muted_until is None else max(at, attention.muted_until)
 
 
@@ -251,29 +250,29 @@ def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: 
         raise NotAssessed(f"cannot be assessed, please report it ({segment.id.name}: {what})") from error
 
 
-def _speak_of_calls(
-    said: NotificationState, known: GliderFacts, acks: Acks, reminder_hours: float | None, now: float
+def _due_of_calls(
+    notified: NotificationState, facts: GliderFacts, acks: Acks, reminder_hours: float | None, now: float
 ) -> tuple[NotificationState, list[Notice]]:
     """What is to be said of what a glider told in its calls."""
-    calls = known.calls(now - GONE)
-    episodes, notices = aborts.announce(known.glider, said.aborts, calls, now, acks, reminder_hours)
-    signs = known.signs(now - GONE)
-    empty, more = without_files.announce(known.glider, said.empty, calls, signs, now, acks)
-    return replace(said, aborts=episodes, empty=empty), [*notices, *more]
+    calls = facts.calls(now - GONE)
+    episodes, notices = aborts.announce(facts.glider, notified.aborts, calls, now, acks, reminder_hours)
+    signs = facts.signs(now - GONE)
+    empty, more = without_files.announce(facts.glider, notified.empty, calls, signs, now, acks)
+    return replace(notified, aborts=episodes, empty=empty), [*notices, *more]
 
 
 def _compare(
-    store: Store, said: NotificationState, last: Assessment | None, params: GliderParams, wanted: bool
+    store: Store, notified: NotificationState, last: Assessment | None, params: GliderParams, wanted: bool
 ) -> tuple[NotificationState, list[Notice]]:
     """What is to be said of a glider beside its neighbours, where that is wanted: once for each surfacing,
     by what was measured until then. Only a glider that is compared with its own currents (`reference: dac`)
     has them in its assessments.
     """
-    before = said.neighbours
+    before = notified.neighbours
     if not wanted or last is None or params.reference != "dac":
-        return said, []
+        return notified, []
     if before is not None and before.checked >= last.t_surface:
-        return said, []
+        return notified, []
     currents = list[DiveCurrent]()
     for glider in store.gliders():
         dives = store.surfaced_between(glider, last.t_surface - CHECK_WINDOW, last.t_surface)
@@ -281,47 +280,47 @@ def _compare(
         currents += [current for current in each if current is not None]
     check = cross_check(currents, last.glider)
     compared, notices = neighbours.announce(last.glider, before, check, last.t_surface)
-    return replace(said, neighbours=compared), notices
+    return replace(notified, neighbours=compared), notices
 
 
 def _due_messages(
     store: Store,
     glider: str,
     params: GliderParams,
-    speaking: Routing | None,
+    routing: Routing | None,
     now: float,
 ) -> tuple[Alert, ...]:
-    if speaking is None:
+    if routing is None:
         return ()
-    store.health.judge(glider, speaking.limits(glider))
-    attention = with_mute(speaking.attention(glider), store.notes.muted_until(glider))
+    store.health.judge(glider, routing.limits(glider))
+    attention = with_mute(routing.attention(glider), store.notes.muted_until(glider))
     if attention.is_quiet(now):
         withdraw_answered(store, glider, now, quiet=True)
         return ()
-    before, known = store.said(glider), store.known(glider)
-    last = known.last_surfacing(inf)
+    before, facts = store.notified(glider), store.facts(glider)
+    last = facts.last_surfacing(inf)
     advice = store.fields.advice(glider, last.t_surface) if last is not None else []
-    silences, heard = overdue.on_calls(before.silences, known, now)
-    said, of_incidents = due_notifications(
+    silences, heard = overdue.on_calls(before.silences, facts, now)
+    notified, of_incidents = due_notifications(
         replace(before, silences=silences),
-        known,
+        facts,
         params.rules.reminder_hours,
-        speaking.notices(glider),
+        routing.notices(glider),
         store.notes.acks(glider),
         tuple((field, each) for field, _, each in advice),
         None if last is None else layers_of_sea.newest(store, glider, last.t_dive - LAST_ADVICE),
     )
-    blind, of_watch = unjudged.announce(said.unknown, known, attention, params.rules.reminder_hours, now)
-    ids, of_files = irregularities.due(before.irregularities, known.irregularities(now), now)
-    said = replace(said, unknown=blind, irregularities=ids)
-    said, of_fleet = _compare(store, said, last, params, attention.neighbours)
+    blind, of_watch = unjudged.announce(notified.unknown, facts, attention, params.rules.reminder_hours, now)
+    ids, of_files = irregularities.due(before.irregularities, facts.irregularities(now), now)
+    notified = replace(notified, unknown=blind, irregularities=ids)
+    notified, of_fleet = _compare(store, notified, last, params, attention.neighbours)
     acks, reminder_hours = store.notes.acks(glider), params.rules.reminder_hours
-    said, of_calls = _speak_of_calls(said, known, acks, reminder_hours, now)
-    rows, fix = store.health.judged(glider), known.last_fix(now - GONE)
-    threads, of_health = health.announce(said.health, glider, rows, fix, acks, reminder_hours)
-    said = replace(said, health=threads)
+    notified, of_calls = _due_of_calls(notified, facts, acks, reminder_hours, now)
+    rows, fix = store.health.judged(glider), facts.last_fix(now - GONE)
+    threads, of_health = health.announce(notified.health, glider, rows, fix, acks, reminder_hours)
+    notified = replace(notified, health=threads)
     due = (*heard, *of_files, *of_incidents, *of_watch, *of_fleet, *of_calls, *of_health)
     alerts = tuple(map(render, due))
-    if said != before or alerts:
-        post_alerts(store, glider, said, alerts, _channels(store, before.silences, speaking), now)
+    if notified != before or alerts:
+        post_alerts(store, glider, notified, alerts, _channels(store, before.silences, routing), now)
     return alerts

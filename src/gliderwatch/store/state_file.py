@@ -142,7 +142,7 @@ class Store:
         rows = self._db.execute("SELECT status, count(*) FROM files GROUP BY status")
         return {Status(row[0]): row[1] for row in rows}
 
-    def note(self, file: File, now: float) -> None:
+    def record(self, file: File, now: float) -> None:
         """Write what became of a file."""
         f, why = file, file.hindrance or ""
         row = (f.path, f.size, f.mtime_ns, f.status, f.glider, f.segment, f.reason, f.crc, now, why)
@@ -179,7 +179,7 @@ class Store:
             [(i.id, glider, i.opened_at, i.cleared_at, codec.plain_encode(i)) for i in outcome.incidents],
         )
 
-    def hear(self, identity: SegmentId, last_t: float | None, now: float) -> None:
+    def record_sign(self, identity: SegmentId, last_t: float | None, now: float) -> None:
         """Note a sign of life: a file of a segment came, with its last sample (s) if it was read; by the
         glider's clock."""
         known = self._db.execute(
@@ -210,13 +210,13 @@ class Store:
 
     def incidents(self, glider: str) -> list[Incident]:
         """All of a glider, in order of time."""
-        return list(self.known(glider).incidents())
+        return list(self.facts(glider).incidents())
 
     def clock_steps(self, glider: str) -> list[ClockStep]:
         """Where the clock of a glider was set back, or is right again, in order of time."""
         return segments.steps(self._db, glider)
 
-    def known(self, glider: str) -> GliderFacts:
+    def facts(self, glider: str) -> GliderFacts:
         """What is known of a glider, for the rules."""
         return GliderFacts(self._db, glider)
 
@@ -245,12 +245,12 @@ class Store:
 
     # ---------------------------------------------------------------- messages
 
-    def said(self, glider: str) -> NotificationState:
+    def notified(self, glider: str) -> NotificationState:
         """What people have been told of a glider."""
         row = self._db.execute("SELECT data FROM said WHERE glider = ?", (glider,)).fetchone()
         return codec.plain_decode(row[0], NotificationState) if row is not None else NotificationState()
 
-    def keep_said(self, glider: str, said: NotificationState) -> None:
+    def keep_notified(self, glider: str, said: NotificationState) -> None:
         """Keep what people have been told of a glider."""
         self._db.execute("INSERT OR REPLACE INTO said VALUES (?, ?)", (glider, codec.plain_encode(said)))
 
