@@ -145,7 +145,7 @@ def test_what_is_open_is_told_when_a_mute_ends_by_itself(site: Site) -> None:
             assert command("mute", "bruce", "--hours", "0.0015", "-c", site.config).returncode == 0
             put(site, *files()[1:])
             until(lambda: box.mails, "told")
-    assert subjects(box)[0] == "ANOMALY"
+    assert subjects(box)[0] == "SLOW"
 
 
 @pytest.mark.slow

@@ -55,7 +55,7 @@ def operator(text: str) -> Alert:
         alert_id=text,
         severity=Severity.CRITICAL,
         audience=Severity.CRITICAL,
-        glider=text,
+        machine=text,
     )
 
 

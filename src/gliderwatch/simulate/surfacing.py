@@ -170,8 +170,8 @@ def surface(glider: Glider, flown: Flown | None) -> tuple[Plan, DiveTruth | None
     glider.drift = seen
     if plan.restart:
         glider.lmc = glider.fix
-        glider.log.mission = plan.opened
-        glider.science.mission = round(plan.opened * CYCLE / SCIENCE_CYCLE)
+        glider.log.missions.append(plan.opened)
+        glider.science.missions.append(round(plan.opened * CYCLE / SCIENCE_CYCLE))
     return plan, truth
 
 

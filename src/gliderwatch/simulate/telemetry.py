@@ -204,7 +204,7 @@ class Log:
 
     ``time`` names its sensor of time and ``skew`` is the error of its clock (s). ``state`` holds the last
     value of every sensor before the updates that are still pending. ``yos`` holds the cycle at which
-    each yo began and its number in its dive. ``mission`` is the cycle at which the mission began.
+    each yo began and its number in its dive. ``missions`` are the cycles at which missions began.
     """
 
     start: float
@@ -212,7 +212,7 @@ class Log:
     step: float
     time: str
     skew: float = 0.0
-    mission: int = 0
+    missions: list[int] = field(default_factory=lambda: [0])
     yos: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)])
     pending: dict[str, list[tuple[NDArray[np.int64], Array]]] = field(default_factory=dict)
 
@@ -261,7 +261,8 @@ class Log:
             period = round(selection.cadence[name] / self.step)
             due[name] = _first_of_each(at[kept], row[kept], first, period)
         cycles = np.unique(np.concatenate([np.empty(0, np.int64), *(at for at, _ in due.values())]))
-        for name, zero in ((self.time, None), (SECONDS, self.mission), (SCIENCE_SECONDS, self.mission)):
+        mission = max((each for each in self.missions if each <= first), default=self.missions[0])
+        for name, zero in ((self.time, None), (SECONDS, mission), (SCIENCE_SECONDS, mission)):
             if name == self.time or name in selection.cadence:
                 origin = 0.0 if zero is None else float(self.clock(zero))
                 before = {**before, name: float(self.clock(first - 1)) - origin}
