@@ -12,7 +12,8 @@ from types import MappingProxyType
 
 from gliderwatch.incidents.acknowledgement import Acks, is_taken_on
 from gliderwatch.incidents.notices import Aborted, AbortReport, Notice, Resumed, StillAborted
-from gliderwatch.incidents.send_schedule import next_reminder
+from gliderwatch.incidents.send_schedule import is_reminder_due
+from gliderwatch.incidents.threads import thread_id
 from gliderwatch.model import Aborts, Call, Happened, Happening, Kind, Severity
 
 SAME = 1800.0
@@ -129,7 +130,8 @@ def announce(
             continue
         if k is None:
             k = len(episodes)
-            episodes.append(Episode(_identity(glider, one.report, episodes), (), 0, one.report.t))
+            identity = thread_id(f"{glider}/abort/{one.report.t:.0f}", [e.id for e in episodes])
+            episodes.append(Episode(identity, (), 0, one.report.t))
         was_noted = bool(episodes[k].told) and episodes[k].severity is Severity.INFO
         cleared = None if was_noted else episodes[k].cleared
         episodes[k] = replace(episodes[k], told=(*episodes[k].told, one.report), cleared=cleared)
@@ -141,7 +143,7 @@ def announce(
         if episode.cleared is None:
             episodes[k], more = _cleared(glider, episode, calls)
             taken_on = k in fresh or is_taken_on(acks, (episode.id,), episode.severity)
-            if not more and reminder_hours is not None and not taken_on:
+            if not more and not taken_on:
                 episodes[k], more = _reminded(glider, episode, calls, reminder_hours)
             notices += more
     return tuple(episodes), notices
@@ -168,13 +170,6 @@ def _is_reported(episode: Episode, report: AbortReport) -> bool:
     return implied or any(report.what == other.what for other in episode.told)
 
 
-def _identity(glider: str, report: AbortReport, episodes: list[Episode]) -> str:
-    identity, taken = f"{glider}/abort/{report.t:.0f}", {e.id for e in episodes}
-    while identity in taken:
-        identity += "+"
-    return identity
-
-
 def _aborted(glider: str, episode: Episode, new: list[Finding]) -> tuple[Episode, Notice]:
     """The episode after one message about what is new in it, and the message."""
     reports = sorted((one.report for one in new), key=lambda r: (-r.severity, _LOUDEST.index(r.what), r.t))
@@ -186,14 +181,13 @@ def _aborted(glider: str, episode: Episode, new: list[Finding]) -> tuple[Episode
 
 
 def _reminded(
-    glider: str, episode: Episode, calls: tuple[Call, ...], hours: float
+    glider: str, episode: Episode, calls: tuple[Call, ...], hours: float | None
 ) -> tuple[Episode, list[Notice]]:
     """The episode, and the reminder of it that its last call makes due; what was only noted needs none."""
     since, call = min(one.t for one in episode.told), max(calls, key=lambda c: c.last_t, default=None)
     if call is None or episode.severity is Severity.INFO:
         return episode, []
-    before, age = ((t - since) / 3600 / hours for t in (episode.time, call.last_t))
-    if age < next_reminder(before):
+    if not is_reminder_due(since, episode.time, call.last_t, hours):
         return episode, []
     reports = sorted(episode.told, key=lambda r: (-r.severity, _LOUDEST.index(r.what), r.t))
     content = StillAborted(tuple(reports), call, (call.last_t - since) / 3600)

@@ -11,6 +11,7 @@ from gliderwatch.incidents.acknowledgement import Acks, is_taken_on
 from gliderwatch.incidents.constants import LONGEST_CALL
 from gliderwatch.incidents.notices import CalledWithoutFile, Notice, SendsAgain
 from gliderwatch.incidents.overdue import HOUR, Sign
+from gliderwatch.incidents.threads import thread_id
 from gliderwatch.model import Call, Kind, Severity
 
 SEVERAL = 2
@@ -108,10 +109,8 @@ def announce(
     since, n = run[0][0].began, len(run)
     state = before
     if state is None or state.is_over:
-        identity = f"{glider}/call/{since:.0f}"
-        if state is not None and state.id.rstrip("+") == identity:
-            identity = state.id + "+"
-        state = Empty(identity, since, 0, 0)
+        taken = [] if state is None else [state.id]
+        state = Empty(thread_id(f"{glider}/call/{since:.0f}", taken), since, 0, 0)
     is_due = n > state.told and (n <= SEVERAL or n >= 2 * state.told)
     if not is_due or now - run[-1][-1].last_t >= NEWS:
         return before, []

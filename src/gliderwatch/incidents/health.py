@@ -22,8 +22,9 @@ from gliderwatch.incidents.notices import (
     HealthReminder,
     Notice,
 )
-from gliderwatch.incidents.send_schedule import next_reminder
+from gliderwatch.incidents.send_schedule import is_reminder_due
 from gliderwatch.incidents.state_machine import TRANSITIONS, Event, Phase
+from gliderwatch.incidents.threads import by_thread, thread_id
 from gliderwatch.model import Fix, Kind, Severity
 
 
@@ -118,7 +119,7 @@ def announce(
     for incident in incidents:
         is_news = incident.cleared_at is None or now.latest - incident.cleared_at < NEWS
         if incident.id not in old and is_news:
-            identity = incident.id + "+" * sum(t.rstrip("+") == incident.id for t in taken)
+            identity = thread_id(incident.id, taken)
             taken.add(identity)
             thread = HealthThread(identity, incident, 0, now.latest)
             thread, more = _notified(thread, incident, HealthFound(incident, False, fix), now)
@@ -139,15 +140,7 @@ def _matched(
     threads: Iterable[HealthThread], incidents: tuple[HealthIncident, ...]
 ) -> dict[str, HealthIncident]:
     """For each thread the incident it is about: the one reported, else one of its rule and time."""
-    by_id = {i.id: i for i in incidents}
-    out = {t.id: by_id[t.reported.id] for t in threads if t.reported.id in by_id}
-    free = [i for i in incidents if i not in out.values()]
-    for thread in threads:
-        near = [i for i in free if thread.id not in out and _overlaps(i, thread.reported)]
-        if near:
-            out[thread.id] = near[0]
-            free.remove(near[0])
-    return out
+    return by_thread({t.id: t.reported for t in threads}, incidents, _overlaps)
 
 
 def _overlaps(now: HealthIncident, reported: HealthIncident) -> bool:
@@ -174,12 +167,10 @@ def _continued(
     if thread.is_over or incident.severity > thread.reported.severity:
         thread, notices = _notified(thread, incident, HealthFound(incident, not thread.is_over, now.fix), now)
         return replace(thread, is_over=False), notices
-    hours = now.reminder_hours
-    if hours is not None and not is_taken_on(now.acks, (incident.id, thread.id), incident.severity):
-        before, age = ((t - incident.opened_at) / 3600 / hours for t in (thread.time, now.latest))
-        if age >= next_reminder(before):
-            reminder = HealthReminder(incident, (now.latest - incident.since) / 3600, now.fix)
-            return _notified(thread, incident, reminder, now)
+    is_wanted = not is_taken_on(now.acks, (incident.id, thread.id), incident.severity)
+    if is_wanted and is_reminder_due(incident.opened_at, thread.time, now.latest, now.reminder_hours):
+        reminder = HealthReminder(incident, (now.latest - incident.since) / 3600, now.fix)
+        return _notified(thread, incident, reminder, now)
     return replace(thread, reported=incident), []
 
 

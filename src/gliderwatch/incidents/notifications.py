@@ -25,8 +25,9 @@ from gliderwatch.incidents.notices import (
     Surfaced,
 )
 from gliderwatch.incidents.overdue import Silence
-from gliderwatch.incidents.send_schedule import next_reminder
+from gliderwatch.incidents.send_schedule import is_reminder_due
 from gliderwatch.incidents.situation import SituationFacts, next_surfacing, situation
+from gliderwatch.incidents.threads import by_thread, thread_id
 from gliderwatch.incidents.unjudged import Unknown
 from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.model import Assessment, Incident, Kind, Severity
@@ -58,7 +59,7 @@ class Thread:
 class NotificationState:
     """What people have been told of one glider.
 
-        ``surfaced`` is the surfacing of the last notice (s), ``silences`` what was sent of its staying away
+    ``surfaced`` is the surfacing of the last notice (s), ``silences`` what was sent of its staying away
     (`incidents.overdue`), ``unknown`` of dives that could not be judged (`incidents.unjudged`), ``aborts`` of
     aborts (`incidents.aborts`), ``empty`` of calls without a file (`incidents.calls`), ``neighbours`` how it
     stood to them (`incidents.neighbours`), ``irregularities`` the ids of those of its files, ``renewed`` the
@@ -261,20 +262,13 @@ def _is_another(dive: Assessment, surfaced: float | None) -> bool:
 
 def _matched(threads: Iterable[Thread], incidents: tuple[Incident, ...]) -> dict[str, Incident]:
     """For each thread the incident that it is about now: the one told, else one of its kind and time."""
-    by_id = {i.id: i for i in incidents}
-    out = {t.id: by_id[t.told.id] for t in threads if t.told.id in by_id}
-    free = [i for i in incidents if i not in out.values()]
-    for thread in threads:
-        if thread.id not in out:
-            near = [i for i in free if i.kind == thread.told.kind and _overlaps(i, thread.told)]
-            if near:
-                out[thread.id] = near[0]
-                free.remove(near[0])
-    return out
+    return by_thread({t.id: t.told for t in threads}, incidents, _overlaps)
 
 
 def _overlaps(now: Incident, told: Incident) -> bool:
-    """Whether an incident shares dives with one that was told, as far as that was told."""
+    """Whether an incident is of the kind of one that was told and shares dives with it, as far as told."""
+    if now.kind != told.kind:
+        return False
     until = told.cleared_at if told.cleared_at is not None else told.last.t_surface
     return now.since <= until and (now.cleared_at is None or told.since <= now.cleared_at)
 
@@ -286,9 +280,7 @@ def _is_news(incident: Incident, latest: Assessment) -> bool:
 def _begun(
     incident: Incident, known: IncidentFacts, latest: Assessment, taken: set[str]
 ) -> tuple[Thread, list[Notice]]:
-    identity = incident.id
-    while identity in taken:
-        identity += "+"
+    identity = thread_id(incident.id, taken)
     thread = Thread(identity, incident, incident.last, 0, latest.t_surface)
     content = Opened(incident, incident.last, situation(known, incident.id))
     thread, alerts = _message(thread, content, latest)
@@ -326,11 +318,9 @@ def _continued(
     if moved or thread.withdrawn or _changed(thread.dive, dive):
         content = Corrected(thread.told, now, dive, _why(thread, dive), situation(known, now.id))
         return _message(thread, content, latest)
-    if not is_clear and reminder_hours is not None:
-        before, age = ((t - now.opened_at) / 3600 / reminder_hours for t in (thread.time, latest.t_surface))
-        if age >= next_reminder(before):
-            hours = (latest.t_surface - now.since) / 3600
-            return _message(thread, StillOpen(now, latest, hours, situation(known, now.id)), latest)
+    if not is_clear and is_reminder_due(now.opened_at, thread.time, latest.t_surface, reminder_hours):
+        hours = (latest.t_surface - now.since) / 3600
+        return _message(thread, StillOpen(now, latest, hours, situation(known, now.id)), latest)
     return thread, []
 
 

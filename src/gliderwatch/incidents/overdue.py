@@ -40,6 +40,7 @@ from gliderwatch.incidents.notices import (
     Notice,
     Overdue,
 )
+from gliderwatch.incidents.threads import thread_id
 from gliderwatch.model import Assessment, Incident, Kind, NextSurfacing, Severity
 from gliderwatch.navigation.geodesy import from_plane, to_plane
 from gliderwatch.sea.gauss_markov import FlowParams
@@ -393,9 +394,7 @@ def _going_on(
     call = expected_call(expected, signs, now, overdue_hours)
     if not is_at_sea(signs, call.interval, now):
         return None
-    identity, taken = f"{known.glider}/overdue/{call.heard:.0f}", {s.id for s in silences}
-    while identity in taken:
-        identity += "+"
+    identity = thread_id(f"{known.glider}/overdue/{call.heard:.0f}", [s.id for s in silences])
     return Silence(identity, call, 0, 0)
 
 

@@ -122,6 +122,15 @@ def deliveries(
     return found
 
 
+def is_reminder_due(opened: float, last: float, now: float, hours: float | None) -> bool:
+    """Whether what is so since a time (s) and was ``last`` brought to mind is to be now; ``hours`` are what
+    is set in place of a day, None: never."""
+    if hours is None:
+        return False
+    before, age = ((t - opened) / 3600 / hours for t in (last, now))
+    return age >= next_reminder(before)
+
+
 def next_reminder(age: float) -> float:
     """The age (days, or what is set in their place) at which an incident is brought to mind that was last
     told of at an ``age``: at 1, 2, 4 and 7 days, then each week, and never within a day of that.

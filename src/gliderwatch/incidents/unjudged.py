@@ -23,6 +23,7 @@ from gliderwatch.incidents.constants import (
 from gliderwatch.incidents.notices import Blind, Blindness, JudgedAgain, Notice, Situation, Unjudged
 from gliderwatch.incidents.overdue import HOUR, Sign, is_at_sea, rhythm
 from gliderwatch.incidents.situation import SituationFacts, situation
+from gliderwatch.incidents.threads import thread_id
 from gliderwatch.model import Kind, NextSurfacing, Severity, Unusable
 from gliderwatch.navigation.constants import SHORTEST_DIVE
 from gliderwatch.params import Attention
@@ -140,9 +141,8 @@ def announce(
 
 
 def _begun(before: Unknown | None, found: Blindness, now: Situation) -> tuple[Unknown, list[Notice]]:
-    identity = f"{found.glider}/unknown/{found.since:.0f}"
-    if before is not None and before.id.rstrip("+") == identity:
-        identity = before.id + "+"
+    taken = [] if before is None else [before.id]
+    identity = thread_id(f"{found.glider}/unknown/{found.since:.0f}", taken)
     return _notified(Unknown(identity, found.since, 0, found.until), found, now)
 
 
