@@ -21,6 +21,7 @@ from gliderwatch.messages.formatting import utc
 from gliderwatch.model import Array, Segment, SegmentId, readonly
 from gliderwatch.navigation.geodesy import to_plane
 from gliderwatch.pipeline import GliderState
+from gliderwatch.service.outputs import put
 from gliderwatch.store.state_file import Store
 
 
@@ -202,11 +203,8 @@ def write_goto(advised: FieldAdvice) -> Path | None:
     if folder is None:
         return None
     path = folder / f"{advised.glider}-{advised.field.name.replace(' ', '_')}-goto.ma"
-    part = path.with_suffix(".tmp")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        part.write_text(goto_list(advised), encoding="ascii", errors="replace")
-        part.replace(path)
+        put(path, goto_list(advised))
     except OSError as error:
         raise GliderwatchError(
             f"{path} cannot be written: {error.strerror}. Let the service write into the folder of "

@@ -12,6 +12,7 @@ from gliderwatch.layers.advice import LayerAdvice, LayerParams, after
 from gliderwatch.layers.band import Band, Method, Tracking
 from gliderwatch.messages.formatting import utc
 from gliderwatch.model import SegmentId
+from gliderwatch.service.outputs import put
 from gliderwatch.store.state_file import Store
 
 
@@ -100,15 +101,12 @@ def write_yo(glider: str, advice: LayerAdvice, outputs: Path) -> list[Path]:
     and this one does not have is removed. Raises GliderwatchError where it cannot."""
     files, written = yo_arguments(glider, advice), list[Path]()
     try:
-        outputs.mkdir(parents=True, exist_ok=True)
         for name in ("full", "band"):
             path = outputs / f"{glider}-yo-{name}.ma"
             if name not in files:
                 path.unlink(missing_ok=True)
                 continue
-            part = path.with_suffix(".tmp")
-            part.write_text(files[name], encoding="ascii", errors="replace")
-            part.replace(path)
+            put(path, files[name])
             written.append(path)
     except OSError as error:
         raise GliderwatchError(
