@@ -111,7 +111,7 @@ def _is_large(found: Hypothesis | None) -> bool:
     return abs(found.size) >= (LEAST_LOSS if found.fault is Fault.LOSS else LEAST_TURN)
 
 
-def cross_check(currents: Iterable[DiveCurrent], glider: str) -> Check | None:
+def cross_check(currents: Sequence[DiveCurrent], glider: str) -> Check | None:
     """Compare the last dives of a glider with the currents of those about it; None where nobody is near.
 
     ``currents`` are those of all gliders, in any order.

@@ -91,7 +91,7 @@ def process_file(
         store.health.put(glider, right.id.name, right.last_t, of_segment(right))
         if fields:
             take(store, fields, store.segments.kept(segment.id))
-        advice = look(store, fields, glider, state) if routing is not None else ()
+        advice = look(store, fields, glider, state) if fields and routing is not None else ()
         alerts = _due_messages(store, glider, params, routing, now)
         deep = layers_of_sea.newest(store, glider) if layers is not None and routing is not None else None
     return FileOutcome(file, assessments, alerts, advice, deep)
@@ -256,7 +256,7 @@ def _due_of_calls(
     """What is to be said of what a glider told in its calls."""
     calls = facts.calls(now - GONE)
     episodes, notices = aborts.announce(facts.glider, notified.aborts, calls, now, acks, reminder_hours)
-    signs = facts.signs(now - GONE)
+    signs = facts.signs(now - GONE) if calls else ()
     empty, more = without_files.announce(facts.glider, notified.empty, calls, signs, now, acks)
     return replace(notified, aborts=episodes, empty=empty), [*notices, *more]
 

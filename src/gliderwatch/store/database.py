@@ -402,6 +402,12 @@ def read_only(path: Path) -> sqlite3.Connection:
     return connection
 
 
+def has_table(connection: sqlite3.Connection, name: str) -> bool:
+    """Whether there is such a table: a file of an earlier release, not migrated yet, may be looked at."""
+    sql = "SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name = ?"
+    return connection.execute(sql, (name,)).fetchone() is not None
+
+
 def refuse_foreign(path: Path, cure: str = "Name another file in state.path, or move this one away") -> None:
     """Raises StateError where there is a file at `path` that is not gliderwatch's. Nothing is written.
 

@@ -17,6 +17,7 @@ from gliderwatch.health.rule import Finding, Limits
 from gliderwatch.health.rules import Judged, judge
 from gliderwatch.model import Array, Series, readonly
 from gliderwatch.store import codec
+from gliderwatch.store.database import has_table
 
 _HELD = 4096
 """Rows whose readings are held in memory, by their text: those of a month of fifteen gliders, some 25 MB."""
@@ -67,7 +68,7 @@ class HealthRows:
 
     def judged(self, glider: str) -> tuple[tuple[float, Judged], ...]:
         """What the rules found in each segment and call of the last weeks, in order of time (s)."""
-        if not self._db.execute("SELECT 1 FROM sqlite_schema WHERE name = 'health'").fetchone():
+        if not has_table(self._db, "health"):
             return ()  # a state file of an earlier release, which may be looked at
         sql = (
             "SELECT t, judged FROM health WHERE glider = ?1 "
@@ -75,13 +76,18 @@ class HealthRows:
             "ORDER BY t, source"
         )
         rows = self._db.execute(sql, (glider, REPORTED))
-        return tuple((t, codec.plain_decode(data, dict[str, Finding | None])) for t, data in rows)
+        return tuple((t, _findings(data)) for t, data in rows)
 
 
 def _packed(readings: Readings) -> _Row:
     parts = [s.t for s in readings.values()] + [s.v for s in readings.values()]
     counts = tuple(len(s) for s in readings.values())
     return _Row(tuple(readings), counts, readonly(np.concatenate(parts) if parts else []))
+
+
+@lru_cache(_HELD)
+def _findings(text: str) -> Judged:
+    return MappingProxyType(codec.plain_decode(text, dict[str, Finding | None]))
 
 
 @lru_cache(_HELD)

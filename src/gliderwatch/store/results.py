@@ -24,6 +24,7 @@ from gliderwatch.model import (
 )
 from gliderwatch.store import codec, segments
 from gliderwatch.store.codec import values
+from gliderwatch.store.database import has_table
 
 
 def _of_dive(dive: Assessment) -> Unjudged:
@@ -69,21 +70,16 @@ class Annotations:
 
     def acks(self, glider: str) -> Acks:
         """The acknowledgements of a glider's incidents."""
-        if not self._is_there("acks"):
+        if not has_table(self._db, "acks"):
             return {}
         rows = self._db.execute("SELECT data FROM acks WHERE glider = ?", (glider,))
         return {ack.incident: ack for ack in (codec.plain_decode(row[0], Ack) for row in rows)}
 
     def _one(self, sql: str, glider: str) -> sqlite3.Row | None:
-        if not self._is_there("mutes"):
+        if not has_table(self._db, "mutes"):
             return None
         row: sqlite3.Row | None = self._db.execute(sql, (glider,)).fetchone()
         return row
-
-    def _is_there(self, table: str) -> bool:
-        """Whether there is such a table: `status` also reads a file that the service has not migrated yet."""
-        sql = "SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name = ?"
-        return self._db.execute(sql, (table,)).fetchone() is not None
 
 
 class GliderFacts:
@@ -117,7 +113,7 @@ class GliderFacts:
 
     def last_log(self) -> str | None:
         """The path of the log of its last call; None where there is none, or no such table yet."""
-        if not self._db.execute("SELECT 1 FROM sqlite_schema WHERE name = 'calls'").fetchone():
+        if not has_table(self._db, "calls"):
             return None
         sql = "SELECT path FROM calls WHERE glider = ? ORDER BY last_t DESC LIMIT 1"
         row = self._db.execute(sql, (self.glider,)).fetchone()
@@ -225,7 +221,7 @@ class GliderFacts:
 
     def _call_signs(self, since: float) -> Iterator[Sign]:
         """Its calls; a state file of an earlier release, which may be looked at, has none."""
-        if not self._db.execute("SELECT 1 FROM sqlite_schema WHERE name = 'calls'").fetchone():
+        if not has_table(self._db, "calls"):
             return
         sql = "SELECT began, last_t, at FROM calls WHERE glider = ? AND last_t >= ?"
         for row in self._db.execute(sql, (self.glider, since)):
@@ -233,7 +229,7 @@ class GliderFacts:
 
     def calls(self, since: float) -> tuple[Call, ...]:
         """Its calls that went on at `since` (s) or later, in order of time."""
-        if not self._db.execute("SELECT 1 FROM sqlite_schema WHERE name = 'calls'").fetchone():
+        if not has_table(self._db, "calls"):
             return ()  # a state file of an earlier release, which may be looked at
         sql = "SELECT call FROM calls WHERE glider = ? AND last_t >= ? ORDER BY began, path"
         return tuple(values(self._db, sql, (self.glider, since), Call))
