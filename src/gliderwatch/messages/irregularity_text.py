@@ -5,13 +5,13 @@ from __future__ import annotations
 from gliderwatch.incidents.notices import Irregularity, OldDates, TwoGliders
 from gliderwatch.messages.formatting import duration, place, utc
 from gliderwatch.messages.lines import name_of
-from gliderwatch.messages.template import Page, Text, titled, told_and_todo
+from gliderwatch.messages.template import Page, Text, lead_and_actions, titled
 from gliderwatch.navigation.clock import DAY, ROLLOVER, ClockStep, span
 
 
 def irregular(_: str, found: Irregularity) -> Text:
     """Files of a glider are wrong although its flight may be right."""
-    lead, todo = told_and_todo(_text(found))
+    lead, todo = lead_and_actions(_text(found))
     first = f"{name_of(found.glider)}: {title(found)}, since {utc(found.t)}."
     return titled(found.glider, _short(found)), Page((first, *lead), do=todo)
 

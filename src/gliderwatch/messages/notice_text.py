@@ -20,7 +20,7 @@ from gliderwatch.messages import (
     unjudged_text,
 )
 from gliderwatch.messages.formatting import clean, utc
-from gliderwatch.messages.template import Page, Text, titled, told_and_todo
+from gliderwatch.messages.template import Page, Text, lead_and_actions, titled
 from gliderwatch.model import Alert, Kind, Severity
 
 _WRITERS: dict[type, Callable[[str, Any], Text]] = {
@@ -82,7 +82,7 @@ def operator(
 
     Lines of the ``text`` that begin with "What to do: " say that.
     """
-    lead, todo = told_and_todo(text)
+    lead, todo = lead_and_actions(text)
     who = f"GLIDERWATCH {clean(machine, 16)}" if machine else "GLIDERWATCH"
     subject = titled("", f"{who}: {title}")
     page = Page((f"{who}, {utc(time)}: {clean(title)}.", *lead), do=todo)

@@ -132,7 +132,7 @@ def sentence(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def told_and_todo(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def lead_and_actions(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Paragraphs, one a line, and of those that begin so what to do, each made one printable line."""
     lines = [line for line in (clean(raw, 500) for raw in text.splitlines()) if line]
     todo = tuple(sentence(line.removeprefix(_TODO)) for line in lines if line.startswith(_TODO))

@@ -111,14 +111,14 @@ def prepare(segment: Segment, declination: float) -> Samples:
     if source == "heading_commanded":
         name = "commanded"
         if not len(t):
-            name, (t, vectors) = "reckoned", _reckoned(out)
+            name, (t, vectors) = "reckoned", _dead_reckoned_headings(out)
         if len(t):
             out[name] = Series(readonly(t), readonly(np.ones(len(t))))
     _add(out, ("heading_e", "heading_n"), t, vectors)
     return MappingProxyType(out)
 
 
-def _reckoned(samples: Mapping[str, Series]) -> tuple[Array, NDArray[np.float64]]:
+def _dead_reckoned_headings(samples: Mapping[str, Series]) -> tuple[Array, NDArray[np.float64]]:
     """Directions of the dead-reckoned way, for files without headings: times in the middle of steps, unit
     vectors.
 

@@ -166,7 +166,7 @@ class Intake:
 
     def _judge(self, path: Path, *, again: bool = False) -> None:
         caches = self._runtime.decoder.cache_folders
-        found = judgement.judge(path, self._store, caches, self._is_known, again=again)
+        found = judgement.judge(path, self._store, caches, self._is_configured, again=again)
         if isinstance(found, Job):
             self._keep_list(path, found)
             self._upkeep.queued(found)
@@ -276,7 +276,7 @@ class Intake:
 
     def _read_log(self, path: Path) -> None:
         """Read on in the log of a call."""
-        found = judgement.judge_log(path, self._store, self._is_known)
+        found = judgement.judge_log(path, self._store, self._is_configured)
         if found is None:
             return
         file, dialog = found
@@ -337,7 +337,7 @@ class Intake:
         waiting = {g: at for g, (at, _) in self._returned.items() if not self._runtime.backlog.more(g)}
         for glider in [g for g, at in waiting.items() if at <= monotonic]:
             del self._returned[glider], waiting[glider]
-            if self._is_known(glider):
+            if self._is_configured(glider):
                 self._notify(glider)
         return min(waiting.values()) - monotonic if waiting else None
 
@@ -366,7 +366,7 @@ class Intake:
     def _routing_if_last(self, glider: str) -> Routing | None:
         """Who is notified of a glider; None while more of its files are at hand, or may be: then the last
         of them is reported for all."""
-        last = self._is_known(glider) and not self._runtime.backlog.more(glider)
+        last = self._is_configured(glider) and not self._runtime.backlog.more(glider)
         return self._runtime.routing if last and not self._may_more_come(glider) else None
 
     def _may_more_come(self, glider: str) -> bool:
@@ -380,5 +380,5 @@ class Intake:
         self._returned[glider] = min(now + QUIET, end), end
         return True
 
-    def _is_known(self, glider: str) -> bool:
+    def _is_configured(self, glider: str) -> bool:
         return glider in self._runtime.config.gliders

@@ -60,7 +60,7 @@ def unassessed(store: Store, folders: Iterable[Path]) -> str | None:
     files = left_out[status]
     if not files:
         return "nothing was assessed: the files were read, but none holds a dive"
-    said = {Status.WAITING: _waiting, Status.UNKNOWN: _unknown, Status.QUARANTINED: _bad}[status]
+    said = {Status.WAITING: _waiting, Status.UNKNOWN: _unknown_gliders, Status.QUARANTINED: _bad}[status]
     return f"nothing was assessed: {said(files, folders)}"
 
 
@@ -74,7 +74,7 @@ def _waiting(files: Sequence[File], folders: Iterable[Path]) -> str:
     return f"{_number(files)} {'wait' if len(files) > 1 else 'waits'} for {lacking}: {cure}"
 
 
-def _unknown(files: Sequence[File], _folders: Iterable[Path]) -> str:
+def _unknown_gliders(files: Sequence[File], _folders: Iterable[Path]) -> str:
     gliders = {file.glider for file in files}
     return (
         f"{_number(files)} of {_some(gliders)}, not in the configuration: "
