@@ -15,7 +15,7 @@ import msgspec
 
 import gliderwatch
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.model import Alert, Assessment, Kind, Segment
+from gliderwatch.model import Alert, Assessment, Kind, NextSurfacing, Segment
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, process
 from gliderwatch.score.accuracy import results as forecast_results
@@ -171,27 +171,11 @@ def run(job: Job, *, direct: bool = False) -> Result:
         for at, a in _fed(store, flown, params)
         if a.kind not in _NOT_MESSAGES
     ]
-    dives = store.assessments(glider)
-    onset = None if job.fault == HEALTHY else ONSET * 24
-    healthy_until = start + HOUR * onset if onset is not None else float("inf")
-    settled = [a for a in dives if a.t_dive >= start + SETTLED * DAY]
-    upcoming = forecast_results(store.forecasts(glider), settled, healthy_until)
+    dives, expected = store.assessments(glider), store.forecasts(glider)
     store.close()
     cpu = (time.process_time() - begun) / max(len(dives), 1)
-    return Result(
-        job.sea,
-        job.seed,
-        job.fault,
-        (flown.truth[-1].t_surface - start) / HOUR,
-        onset,
-        tuple(messages),
-        dive_results(dives, flown.truth),
-        tuple(f"{(a.t_dive - start) / HOUR:.1f} h, flag {a.flag}: {a.reason}" for a in dives if a.flag),
-        upcoming,
-        start,
-        _cost(flown.segments, params) if job.fault == HEALTHY and job.seed == 0 else 0.0,
-        cpu,
-    )
+    cost = _cost(flown.segments, params) if job.fault == HEALTHY and job.seed == 0 else 0.0
+    return _result(job, flown, messages, dives, expected, cost, cpu)
 
 
 def run_bare(job: Job) -> Result:
@@ -210,23 +194,38 @@ def run_bare(job: Job) -> Result:
             opened.setdefault(i.id, Message(*hours, str(i.kind), f"{i.kind} opened: {i.worst.reason}"))
         said += [outcome.expected] if outcome.expected is not None else []
     every = [dives[t] for t in sorted(dives)]
+    cost = (time.process_time() - begun) / max(len(every), 1)
+    messages = sorted(opened.values(), key=lambda m: m.hours)
+    return _result(job, flown, messages, every, said, cost, cost)
+
+
+def _result(
+    job: Job,
+    flown: Flight,
+    messages: Sequence[Message],
+    dives: Sequence[Assessment],
+    expected: Sequence[NextSurfacing],
+    cost: float,
+    cpu: float,
+) -> Result:
+    """What came of a flight, with forecasts beside the truth until a fault begins."""
+    start = flown.segments[0].id.opened_at
     onset = None if job.fault == HEALTHY else ONSET * 24
     until = start + HOUR * onset if onset is not None else float("inf")
-    settled = [a for a in every if a.t_dive >= start + SETTLED * DAY]
-    cost = (time.process_time() - begun) / max(len(every), 1)
+    settled = [a for a in dives if a.t_dive >= start + SETTLED * DAY]
     return Result(
         job.sea,
         job.seed,
         job.fault,
         (flown.truth[-1].t_surface - start) / HOUR,
         onset,
-        tuple(sorted(opened.values(), key=lambda m: m.hours)),
-        dive_results(every, flown.truth),
-        tuple(f"{(a.t_dive - start) / HOUR:.1f} h, flag {a.flag}: {a.reason}" for a in every if a.flag),
-        forecast_results(said, settled, until),
+        tuple(messages),
+        dive_results(dives, flown.truth),
+        tuple(f"{(a.t_dive - start) / HOUR:.1f} h, flag {a.flag}: {a.reason}" for a in dives if a.flag),
+        forecast_results(expected, settled, until),
         start,
         cost,
-        cost,
+        cpu,
     )
 
 
