@@ -203,6 +203,31 @@ def test_a_score_that_is_stopped_says_so_without_a_traceback(tmp_path: Path) -> 
     assert TRACEBACK not in said and "KeyboardInterrupt" not in said, said
 
 
+STOPPED_AT_THE_THIRD_TASK = """
+import os, signal
+from gliderwatch.cli.main import main
+from gliderwatch.score import work
+
+class Pool(work.ProcessPoolExecutor):
+    def submit(self, *args, given=[]):
+        given.append(args)
+        if len(given) == 3:
+            os.kill(os.getpid(), signal.SIGINT)
+        return super().submit(*args)
+
+work.ProcessPoolExecutor = Pool
+main(["score", "--out", "out"])
+"""
+
+
+def test_a_score_that_is_stopped_while_it_hands_out_tasks_ends_as_well(tmp_path: Path) -> None:
+    """There Ctrl-C came outside what ends the workers, and the command ran all its cells to the end."""
+    words = [sys.executable, "-c", STOPPED_AT_THE_THIRD_TASK]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert done.returncode == 1 and "Aborted" in done.stderr
+    assert TRACEBACK not in done.stderr and "KeyboardInterrupt" not in done.stderr, done.stderr
+
+
 @pytest.mark.slow
 def test_a_demo_that_is_stopped_says_so_and_leaves_nothing(tmp_path: Path) -> None:
     demo = ROOT / "demo" / "demo.py"

@@ -336,9 +336,9 @@ def run_all(tasks: Sequence[Task], on_done: Callable[[], None]) -> list[str]:
     context = multiprocessing.get_context("spawn")  # to fork a process with threads is unsafe
     failed: dict[str, None] = {}  # of one mission all cells fail alike
     with ProcessPoolExecutor(min(cores, len(tasks)), mp_context=context) as pool:
-        with _deaf():  # to Ctrl-C, for good: it is this process that ends them, without a word of theirs
-            futures = [pool.submit(work, task) for task in tasks]
         try:
+            with _deaf():  # to Ctrl-C, for good: it is this process that ends them, without a word of theirs
+                futures = [pool.submit(work, task) for task in tasks]
             for future in as_completed(futures):
                 try:
                     future.result()
