@@ -89,6 +89,9 @@ def test_what_is_known_is_exported_by_command(site: Site, tmp_path: Path) -> Non
     assert json.loads(found.stdout)["type"] == "FeatureCollection"
     assert command("export", "angus", "--format", "netcdf", "--out", out / "a.nc", *state).returncode == 0
     assert (out / "a.nc").read_bytes().startswith(b"\x89HDF")
+    for form, name in (("csv", "new/dives.csv"), ("netcdf", "newer/dives.nc")):
+        done = command("export", "angus", "--format", form, "--out", out / name, *state)
+        assert done.returncode == 0 and (out / name).stat().st_size, done.stderr
     told = command("where", "angus", *state)
     assert "95 % within" in told.stdout
     told = command("where", "nobody", *state)

@@ -98,9 +98,9 @@ def test_the_field_of_the_fleet_is_that_of_the_sea(site: Path) -> None:
 
 def test_salinity_is_that_of_the_water(site: Path) -> None:
     state = "results/replay.sqlite"
-    done = command("field", "salt", "-c", "gliderwatch.yml", "--state", state, "--out", "s.nc", cwd=site)
+    done = command("field", "salt", "-c", "gliderwatch.yml", "--state", state, "--out", "maps/s.nc", cwd=site)
     assert done.returncode == 0, done.stderr
-    with Dataset(site / "s.nc") as file:
+    with Dataset(site / "maps/s.nc") as file:
         assert np.abs(file["salinity"][0, 1:-1] - 35.0).max() < 0.1  # nobody was at the top and the bottom
 
 

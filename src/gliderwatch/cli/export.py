@@ -122,6 +122,8 @@ def export(
     """
     from gliderwatch.export import dives, maps, netcdf
 
+    if out is not None:
+        out.parent.mkdir(parents=True, exist_ok=True)
     with viewing(config_path, state, at, glider) as views:
         if form == "netcdf":
             if out is None or len(views) != 1:

@@ -47,6 +47,7 @@ def field(config_path: Path, name: str, out: Path, at: str | None, state: Path |
     except ValueError as error:
         raise click.UsageError(f"--at: {at} {error}") from None
     path = not_on_dockserver(config, out)
+    path.parent.mkdir(parents=True, exist_ok=True)
     store = Store.reading(state if state is not None else Path(config.state.path))
     try:
         with store.guarded():
