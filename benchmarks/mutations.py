@@ -32,13 +32,13 @@ PACKAGE = ROOT / "src" / "gliderwatch"
 TESTS = {
     "navigation": "unit/test_heuristics_navigation unit/test_current unit/test_dives unit/test_features"
     " unit/test_fixes unit/test_flight unit/test_samples unit/test_track",
-    "sea": "unit/test_heuristics_sea unit/test_flow unit/test_currents_field unit/test_currents_constituents"
+    "sea": "unit/test_heuristics_sea unit/test_gauss_markov unit/test_ocean_field unit/test_tides"
     " integration/test_ocean",
-    "estimation": "unit/test_heuristics_estimation unit/test_consistency unit/test_range unit/test_baseline"
-    " unit/test_reckoned unit/test_sequential unit/test_learner unit/test_speed unit/test_joint"
+    "estimation": "unit/test_heuristics_estimation unit/test_verdict_misfit unit/test_speed_range unit/test_healthy_baseline"
+    " unit/test_kinematic_speed unit/test_step_test unit/test_adaptive unit/test_verdict unit/test_kalman"
     " unit/test_glider_estimate",
-    "layers": "unit/test_heuristics_layers unit/test_layers unit/test_layer_advice unit/test_layers_water",
-    "forecast": "unit/test_heuristics_forecast unit/test_forecast_flow unit/test_forecast_steering"
+    "layers": "unit/test_heuristics_layers unit/test_layers unit/test_layer_advice unit/test_water",
+    "forecast": "unit/test_heuristics_forecast unit/test_kalman_expected_flow unit/test_forecast_steering"
     " unit/test_forecast_surfacing unit/test_forecast_timing unit/test_forecast_waypoints"
     " property/test_forecast",
     "incidents": "unit/test_heuristics_rules unit/test_announce unit/test_incident unit/test_silence"
