@@ -34,9 +34,9 @@ TESTS = {
     " unit/test_fixes unit/test_flight unit/test_samples unit/test_track",
     "sea": "unit/test_heuristics_sea unit/test_gauss_markov unit/test_ocean_field unit/test_tides"
     " integration/test_ocean",
-    "estimation": "unit/test_heuristics_estimation unit/test_verdict_misfit unit/test_speed_range unit/test_healthy_baseline"
-    " unit/test_kinematic_speed unit/test_step_test unit/test_adaptive unit/test_verdict unit/test_kalman"
-    " unit/test_glider_estimate",
+    "estimation": "unit/test_heuristics_estimation unit/test_verdict_misfit unit/test_speed_range"
+    " unit/test_healthy_baseline unit/test_kinematic_speed unit/test_step_test unit/test_adaptive"
+    " unit/test_verdict unit/test_kalman unit/test_glider_estimate",
     "layers": "unit/test_heuristics_layers unit/test_layers unit/test_layer_advice unit/test_water",
     "forecast": "unit/test_heuristics_forecast unit/test_kalman_expected_flow unit/test_forecast_steering"
     " unit/test_forecast_surfacing unit/test_forecast_timing unit/test_forecast_waypoints"
