@@ -12,9 +12,9 @@ import pytest
 
 from gliderwatch.layers.advice import Layered, LayerParams, after
 from gliderwatch.layers.band import Band, Method, Mode, Tracking
-from gliderwatch.service.layers import write_yo
 from gliderwatch.simulate.dinkum import Header, Sensor, SensorList, encode
 from gliderwatch.slocum.decode import decode_science
+from gliderwatch.slocum.mission_arguments import write_yo
 
 HOUR, DAY = 3600.0, 86400.0
 START = 1.7e9

@@ -7,8 +7,8 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 from alert_support import SLOW, alert
+from gliderwatch.export.dives import alert_line, assessment_line, iso_ms, write_lines
 from gliderwatch.model import Assessment
-from gliderwatch.service.jsonl import alert_line, assessment_line, iso, write_lines
 
 PROMISED = {
     "glider",
@@ -34,8 +34,8 @@ PROMISED = {
 
 
 def test_times_are_utc_to_the_millisecond() -> None:
-    assert iso(0.0) == "1970-01-01T00:00:00.000Z"
-    assert iso(1667639520.0004) == "2022-11-05T09:12:00.000Z"
+    assert iso_ms(0.0) == "1970-01-01T00:00:00.000Z"
+    assert iso_ms(1667639520.0004) == "2022-11-05T09:12:00.000Z"
 
 
 def test_an_assessment_has_all_its_fields_and_the_ones_promised() -> None:

@@ -16,7 +16,7 @@ from gliderwatch.layers.band import Band, Method, Mode, Tracking
 from gliderwatch.layers.composite import Layer
 from gliderwatch.messages.incident_text import surfaced
 from gliderwatch.model import Segment, SegmentId, Series, readonly
-from gliderwatch.service.layers import write_yo, yo_arguments
+from gliderwatch.slocum.mission_arguments import write_yo, yo_arguments
 
 PARAMS = LayerParams("temperature", 200.0, 10.0, 10.0, Method.COMPOSITE, 2)
 TRACK = Tracking(Mode.TRACK, Band(28.0, 62.0), 30.0, 60.0, 0.4, 0.0, 2.0, (Layer(30.0, 60.0, -0.4, 1.0),))

@@ -5,19 +5,17 @@ from pathlib import Path
 import pytest
 
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.fleet.advice import Advice, Box
-from gliderwatch.fleet.scalar_field import FieldParams
-from gliderwatch.service.fields import FieldAdvice, FleetField, write_goto
+from gliderwatch.fleet.advice import Advice
+from gliderwatch.slocum.mission_arguments import write_goto
 
 
-def advised(folder: Path | None) -> FieldAdvice:
-    box = Box(41.0, -71.0, 42.0, -70.0, 0.0, 100.0)
-    field = FleetField("upper layer", box, "sci_water_temp", FieldParams(), outputs=folder)
-    return FieldAdvice(field, "electa", 1.7e9, Advice(0.5, 41.999999, -70.504166, 0.034, None))
+def written(folder: Path) -> Path:
+    advice = Advice(0.5, 41.999999, -70.504166, 0.034, None)
+    return write_goto("electa", "upper layer", 1.7e9, advice, folder)
 
 
 def test_a_goto_list_of_one_waypoint(tmp_path: Path) -> None:
-    path = write_goto(advised(tmp_path / "out"))
+    path = written(tmp_path / "out")
     assert path == tmp_path / "out" / "electa-upper_layer-goto.ma"
     lines = path.read_text().splitlines()
     assert lines[0] == "behavior_name=goto_list"
@@ -29,8 +27,7 @@ def test_a_goto_list_of_one_waypoint(tmp_path: Path) -> None:
     assert list(path.parent.iterdir()) == [path]
 
 
-def test_nothing_is_written_where_nothing_is_wanted_or_can_be(tmp_path: Path) -> None:
-    assert write_goto(advised(None)) is None
+def test_where_it_cannot_be_written_the_setting_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(GliderwatchError, match=r"fields\.upper layer\.advice\.outputs"):
-        write_goto(advised(tmp_path / "file"))
+        written(tmp_path / "file")

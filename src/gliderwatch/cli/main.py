@@ -9,16 +9,13 @@ import click
 
 from gliderwatch import __version__
 from gliderwatch.cli.export import COMMANDS as EXPORTING
-from gliderwatch.cli.field import field
 from gliderwatch.cli.layers import layers
 from gliderwatch.cli.look import LOOKING
 from gliderwatch.cli.manage import COMMANDS
 from gliderwatch.cli.options import Group
-from gliderwatch.cli.pages import pages
+from gliderwatch.cli.pages import pages, web
 from gliderwatch.cli.run import run
-from gliderwatch.cli.score import score
-from gliderwatch.cli.simulate import simulate
-from gliderwatch.cli.web import web
+from gliderwatch.cli.simulation import score, simulate
 
 
 @click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"]})
@@ -30,5 +27,5 @@ def main() -> None:
             stream.reconfigure(errors="replace")
 
 
-for command in (run, *LOOKING, *COMMANDS, *EXPORTING, pages, web, field, layers, simulate, score):
+for command in (run, *LOOKING, *COMMANDS, *EXPORTING, pages, web, layers, simulate, score):
     main.add_command(command)

@@ -11,6 +11,7 @@ from typing import Any
 from gliderwatch.cli.manage import reading, writing
 from gliderwatch.config import Config, linked_gliders
 from gliderwatch.errors import GliderwatchError
+from gliderwatch.export.dives import assessment_line, iso_ms
 from gliderwatch.incidents.acknowledgement import Ack, Acks, acknowledge, acknowledge_thread, with_mute
 from gliderwatch.incidents.constants import GONE, RECENT
 from gliderwatch.incidents.notices import Acknowledged, Irregularity, Notice
@@ -21,7 +22,6 @@ from gliderwatch.messages.formatting import clean
 from gliderwatch.messages.notice_text import render
 from gliderwatch.model import Assessment, Call, Incident, Kind, NextSurfacing, Severity
 from gliderwatch.params import Attention
-from gliderwatch.service.jsonl import assessment_line, iso
 from gliderwatch.service.liveness import STALE, is_held, seconds_silent
 from gliderwatch.service.routing import channels, post_alert, withdraw_answered
 from gliderwatch.slocum.folders import Link
@@ -171,15 +171,15 @@ def incidents_as_json(noted: IncidentEntry) -> dict[str, Any]:
         "glider": i.glider,
         "kind": str(i.kind),
         "severity": i.severity.name.lower(),
-        "since": iso(i.since),
+        "since": iso_ms(i.since),
         "acknowledged": None if noted.ack is None else ack_json(noted.ack, i),
     }
     if isinstance(i, OpenThread):
         return {**common, "about": i.about}
     return {
         **common,
-        "opened_at": iso(i.opened_at),
-        "cleared_at": None if i.cleared_at is None else iso(i.cleared_at),
+        "opened_at": iso_ms(i.opened_at),
+        "cleared_at": None if i.cleared_at is None else iso_ms(i.cleared_at),
         "dives": i.dives,
         "worst": _dive(i.worst),
         "last": _dive(i.last),
@@ -188,13 +188,13 @@ def incidents_as_json(noted: IncidentEntry) -> dict[str, Any]:
 
 def ack_json(made: Ack, incident: Incident | OpenThread) -> dict[str, Any]:
     """An acknowledgement for machines; `worse`: the incident has grown worse since."""
-    return {"by": made.by, "note": made.note, "at": iso(made.at), "worse": not _holds(made, incident)}
+    return {"by": made.by, "note": made.note, "at": iso_ms(made.at), "worse": not _holds(made, incident)}
 
 
 def _dive(a: Assessment) -> dict[str, Any]:
     return {
-        "t_dive": iso(a.t_dive),
-        "t_surface": iso(a.t_surface),
+        "t_dive": iso_ms(a.t_dive),
+        "t_surface": iso_ms(a.t_surface),
         "flag": a.flag,
         "speed": a.speed,
         "speed_min": a.speed_min,
@@ -360,8 +360,8 @@ def _call_as_json(call: Call | None) -> dict[str, Any] | None:
     if call is None or call.fix is None:
         return None
     return {
-        "at": iso(call.last_t),
-        "fix": {"at": iso(call.fix.t), "lat": call.fix.lat, "lon": call.fix.lon},
+        "at": iso_ms(call.last_t),
+        "fix": {"at": iso_ms(call.fix.t), "lat": call.fix.lat, "lon": call.fix.lon},
         "waypoint": None if call.waypoint is None else {"lat": call.waypoint[0], "lon": call.waypoint[1]},
         "because": call.reason or None,
         "mission": call.mission or None,
@@ -381,11 +381,11 @@ def status_as_json(view: Overview) -> dict[str, Any]:
                 "latest": assessment_line(g.latest) if g.latest is not None else None,
                 "incidents": [_incident(i, g.acks) for i in g.incidents],
                 "irregularities": [
-                    {"since": iso(i.t), "title": irregularity_text.title(i)} for i in g.irregularities
+                    {"since": iso_ms(i.t), "title": irregularity_text.title(i)} for i in g.irregularities
                 ],
                 "open": [incidents_as_json(IncidentEntry(t, g.acks.get(t.id))) for t in g.threads],
                 "last_call": _call_as_json(g.call),
-                "announced_and_not_come": [{"call": iso(t), "file": name} for t, name in g.not_come],
+                "announced_and_not_come": [{"call": iso_ms(t), "file": name} for t, name in g.not_come],
                 **_silence(g),
             }
             for g in view.gliders
@@ -403,7 +403,7 @@ def status_as_json(view: Overview) -> dict[str, Any]:
             {
                 "alert": u.alert,
                 "channel": u.channel,
-                "until": iso(u.held_until),
+                "until": iso_ms(u.held_until),
                 "unless_acknowledged": u.escalates,
             }
             for u in view.held
@@ -417,8 +417,8 @@ def _incident(i: Incident, acks: Acks) -> dict[str, Any]:
         "id": i.id,
         "kind": str(i.kind),
         "severity": i.severity.name.lower(),
-        "since": iso(i.since),
-        "opened_at": iso(i.opened_at),
+        "since": iso_ms(i.since),
+        "opened_at": iso_ms(i.opened_at),
         "dives": i.dives,
         "acknowledged": None if ack is None else ack_json(ack, i),
     }
@@ -431,16 +431,16 @@ def _silence(g: GliderStatus) -> dict[str, Any]:
         "expected": None
         if call is None or g.expected is None
         else {
-            "t": iso(call.t),
+            "t": iso_ms(call.t),
             "t_sigma": g.expected.t_sigma,
             "lat": place[0] if place is not None else None,
             "lon": place[1] if place is not None else None,
             "source": g.expected.source,
         },
-        "heard": iso(call.heard) if call is not None else None,
-        "overdue_at": iso(call.due) if call is not None else None,
+        "heard": iso_ms(call.heard) if call is not None else None,
+        "overdue_at": iso_ms(call.due) if call is not None else None,
         "overdue": g.overdue_since is not None,
         "ended": g.is_over,
-        "muted_until": iso(muted_until) if muted_until is not None and g.is_muted else None,
+        "muted_until": iso_ms(muted_until) if muted_until is not None and g.is_muted else None,
         "recovered": g.attention.recovered,
     }

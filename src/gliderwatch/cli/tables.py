@@ -12,12 +12,12 @@ from rich.text import Text
 
 from gliderwatch.cli.status import GliderStatus, IncidentEntry, Overview
 from gliderwatch.config import Problem
+from gliderwatch.export.dives import iso_ms
 from gliderwatch.incidents.acknowledgement import Ack
 from gliderwatch.incidents.notifications import OpenThread
 from gliderwatch.messages import irregularity_text
 from gliderwatch.messages.formatting import clean, duration, place, utc
 from gliderwatch.model import Alert, Assessment, Flag, Incident, Kind, Severity
-from gliderwatch.service.jsonl import iso
 from gliderwatch.store.state_file import File, Status
 
 # ----------------------------------------
@@ -58,7 +58,7 @@ WIDE = 10_000
 
 def dives(assessments: Sequence[Assessment], *, whole: bool = False) -> Table:
     """The dives of a mission, one a line; 80 columns, for which a long reason is wrapped, unless `whole`."""
-    years = sorted({iso(a.t_surface)[:4] for a in assessments})
+    years = sorted({iso_ms(a.t_surface)[:4] for a in assessments})
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
     for name in (f"{'/'.join(years)} UTC", "h"):
         table.add_column(name, no_wrap=True)
@@ -67,7 +67,7 @@ def dives(assessments: Sequence[Assessment], *, whole: bool = False) -> Table:
         table.add_column(name, justify="right", no_wrap=True)
     for a in assessments:
         table.add_row(
-            iso(a.t_surface)[5:16].replace("T", " "),
+            iso_ms(a.t_surface)[5:16].replace("T", " "),
             _number(a.evidence.get("duration_h"), ".1f"),
             flag(a),
             _number(a.speed),
@@ -187,7 +187,7 @@ def _glider(g: GliderStatus) -> list[str]:
     speeds = f"{a.speed_min:.2f}-{a.speed_max:.2f}"
     return [
         name,
-        iso(a.t_surface)[2:16].replace("T", " "),
+        iso_ms(a.t_surface)[2:16].replace("T", " "),
         where,
         flag(a),
         _number(a.speed),

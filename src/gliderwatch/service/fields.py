@@ -11,17 +11,14 @@ import msgspec
 import numpy as np
 
 from gliderwatch.config import Config
-from gliderwatch.errors import GliderwatchError
 from gliderwatch.fleet.advice import Advice, Bounds, Box, Leg, Point, Way, advise, with_planned
 from gliderwatch.fleet.batches import Sensor, batch_of, params_of, whereabouts
 from gliderwatch.fleet.constants import NO_MORE_AT_SEA, USUAL_LEG
 from gliderwatch.fleet.scalar_field import Batch, Checkpoint, FieldParams, at
 from gliderwatch.forecast.outlook import look_ahead
-from gliderwatch.messages.formatting import utc
 from gliderwatch.model import Array, Segment, SegmentId, readonly
 from gliderwatch.navigation.geodesy import to_plane
 from gliderwatch.pipeline import GliderState
-from gliderwatch.service.outputs import put
 from gliderwatch.store.state_file import Store
 
 
@@ -45,12 +42,14 @@ class FleetField:
 
 @dataclass(frozen=True, slots=True)
 class FieldAdvice:
-    """What is advised to a glider for a field, at a surfacing ``t`` (s)."""
+    """What is advised to a glider for a field, by name, at a surfacing ``t`` (s); a file of it goes to the
+    folder ``outputs``."""
 
-    field: FleetField
+    field: str
     glider: str
     t: float
     advice: Advice
+    outputs: Path
 
 
 def fields_of(config: Config) -> tuple[FleetField, ...]:
@@ -100,7 +99,7 @@ def look(
         found = _advice(store, field, glider, newest, t, way)
         store.fields.advise(field.name, glider, t, found)
         if found is not None:
-            out.append(FieldAdvice(field, glider, t, found))
+            out.append(FieldAdvice(field.name, glider, t, found, field.outputs))
     return tuple(out)
 
 
@@ -171,54 +170,3 @@ def _others(store: Store, glider: str, t: float) -> tuple[tuple[Point, ...], lis
         leg = Leg(last.lat, last.lon, hypot(east, north) / duration, duration)
         legs.append((leg, atan2(east, north)))
     return tuple(ends), legs
-
-
-# ----------------------------------------
-# The mission argument of an advice: for a pilot to check and send.
-
-
-def goto_list(advised: FieldAdvice) -> str:
-    """The file of mission arguments that leads a Slocum to a waypoint (behavior `goto_list`)."""
-    advice = advised.advice
-    return f"""behavior_name=goto_list
-# Made by gliderwatch for {advised.glider}, surfaced {utc(advised.t)}. Check it before you send it.
-# Field {advised.field.name}: this leg takes {100 * advice.variance:.1f} % off the mean variance.
-<start:b_arg>
-    b_arg: num_legs_to_run(nodim)   -1
-    b_arg: start_when(enum)          0
-    b_arg: list_stop_when(enum)      7
-    b_arg: initial_wpt(enum)         0
-    b_arg: num_waypoints(nodim)      1
-<end:b_arg>
-<start:waypoints>
-{_degrees_minutes(advice.lon)} {_degrees_minutes(advice.lat)}
-<end:waypoints>
-"""
-
-
-def write_goto(advised: FieldAdvice) -> Path | None:
-    """Write the mission argument into the folder of outputs; its path. Raises GliderwatchError where it
-    cannot."""
-    folder = advised.field.outputs
-    if folder is None:
-        return None
-    path = folder / f"{advised.glider}-{advised.field.name.replace(' ', '_')}-goto.ma"
-    try:
-        put(path, goto_list(advised))
-    except OSError as error:
-        raise GliderwatchError(
-            f"{path} cannot be written: {error.strerror}. Let the service write into the folder of "
-            f"fields.{advised.field.name}.advice.outputs, or name another"
-        ) from None
-    return path
-
-
-def _degrees_minutes(value: float) -> str:
-    """A coordinate (degrees) as a Slocum has it: degrees times 100, and minutes.
-
-    >>> _degrees_minutes(-70.504166), _degrees_minutes(41.9999999)
-    ('-7030.2500', '4200.0000')
-    """
-    minutes = round(abs(value) * 60, 4)
-    sign = "-" if value < 0 else ""
-    return f"{sign}{int(minutes // 60) * 100 + minutes % 60:.4f}"

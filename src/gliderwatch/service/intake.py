@@ -19,13 +19,13 @@ from gliderwatch.errors import GliderwatchError, Quarantine, StateError
 from gliderwatch.model import Alert, Segment
 from gliderwatch.service import judgement, logs, transaction
 from gliderwatch.service.backlog import Job
-from gliderwatch.service.fields import write_goto
 from gliderwatch.service.heartbeat import Upkeep
-from gliderwatch.service.layers import layers_of, write_yo
+from gliderwatch.service.layers import layers_of
 from gliderwatch.service.routing import Routing
 from gliderwatch.service.runtime import Decoded, Runtime
 from gliderwatch.slocum import folders
-from gliderwatch.slocum.science import flight_files
+from gliderwatch.slocum.folders import flight_files
+from gliderwatch.slocum.mission_arguments import write_goto, write_yo
 from gliderwatch.slocum.watch import CacheChanged
 from gliderwatch.store.state_file import File, Status, Store
 
@@ -296,7 +296,7 @@ class Intake:
         self.send(outcome.alerts)
         for advice in outcome.advice:
             try:
-                path = write_goto(advice)
+                path = write_goto(advice.glider, advice.field, advice.t, advice.advice, advice.outputs)
             except GliderwatchError as error:
                 log.error("advice cannot be written", glider=advice.glider, reason=str(error))
             else:

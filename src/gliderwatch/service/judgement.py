@@ -12,10 +12,10 @@ from pathlib import Path
 from gliderwatch.errors import MissingCache, NotAssessed, Quarantine, Retry
 from gliderwatch.model import Hindrance
 from gliderwatch.service.backlog import Job
-from gliderwatch.slocum.caches import is_there
+from gliderwatch.slocum.caches import is_there, needs_science
 from gliderwatch.slocum.calls import Dialog, read_log
+from gliderwatch.slocum.folders import science_files
 from gliderwatch.slocum.header import read_header
-from gliderwatch.slocum.science import needs_science, science_files
 from gliderwatch.store.codec import plain_decode
 from gliderwatch.store.state_file import File, Status, Store
 

@@ -18,6 +18,7 @@ from gliderwatch.config import Config, expand
 from gliderwatch.delivery.channels import Channel
 from gliderwatch.delivery.dispatcher import Dispatcher
 from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine, Retry
+from gliderwatch.export.dives import alert_line, assessment_line, write_lines
 from gliderwatch.incidents.constants import GONE
 from gliderwatch.messages.formatting import clean
 from gliderwatch.model import Alert, Hindrance, Segment
@@ -26,7 +27,6 @@ from gliderwatch.params import GliderParams
 from gliderwatch.service import judgement, transaction
 from gliderwatch.service.backlog import Job
 from gliderwatch.service.fields import FleetField, fields_of
-from gliderwatch.service.jsonl import alert_line, assessment_line, write_lines
 from gliderwatch.service.layers import layers_of, wants_science
 from gliderwatch.service.liveness import alive_path
 from gliderwatch.service.replay_order import Log, ReplayOrder, find_logs, read_logs

@@ -8,7 +8,7 @@ import os
 import shutil
 import tempfile
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import product
@@ -17,6 +17,7 @@ from pathlib import Path
 from gliderwatch.errors import GliderwatchError, MissingCache, Retry
 from gliderwatch.slocum.cycles import Sensors, parse_sensor_list
 from gliderwatch.slocum.header import Header, decompress, parse_header, plain, read_regular
+from gliderwatch.slocum.sensors import DEPTH, PRESSURES
 
 # ----------------------------------------
 # Cache files: the sensor lists that factored headers leave out, and scratch copies of them that no other
@@ -285,3 +286,16 @@ def _own_list(path: Path) -> bytes | None:
     except (GliderwatchError, ValueError):
         return None
     return content[header.length : end]
+
+
+def needs_science(header: Header, folders: Sequence[Path]) -> bool:
+    """Whether the list of sensors of a flight file names nothing that tells the depth.
+
+    False where the list is not known: then the file waits for it, or holds it, and is dealt with later.
+    """
+    with suppress(OSError):
+        for path in candidates(header.crc, folders):
+            with suppress(GliderwatchError, ValueError):
+                _, sensors = read_list(path, header.crc)
+                return set(sensors.names).isdisjoint((DEPTH, *PRESSURES))
+    return False

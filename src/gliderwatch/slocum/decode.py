@@ -37,8 +37,8 @@ from gliderwatch.model import Segment
 from gliderwatch.slocum import folders
 from gliderwatch.slocum.caches import Scratch, Staging, checksum
 from gliderwatch.slocum.cycles import Sensors, intact, parse_sensor_list
+from gliderwatch.slocum.folders import science_files
 from gliderwatch.slocum.header import Header, parse_header, plain, read_regular
-from gliderwatch.slocum.science import science_files
 from gliderwatch.slocum.sensors import (
     PRESSURES,
     SCIENCE_SENSORS,

@@ -73,6 +73,24 @@ def flight_of(name: str) -> tuple[str, ...]:
     return _FLIGHT_OF.get(_suffix(name).replace("c", "b"), ())
 
 
+def science_files(flight: Path) -> Iterator[Path]:
+    """The science files of the same name beside a flight file, plain or compressed."""
+    return _beside(flight, science_of(flight.name))
+
+
+def flight_files(science: Path) -> Iterator[Path]:
+    """The flight files of the same name beside a science file, plain or compressed."""
+    return _beside(science, flight_of(science.name))
+
+
+def _beside(path: Path, suffixes: tuple[str, ...]) -> Iterator[Path]:
+    for suffix in suffixes:
+        for name in (f"{path.stem}.{suffix}", f"{path.stem}.{suffix.upper()}"):
+            other = path.with_name(name)
+            if other.is_file() and not other.is_symlink():
+                yield other
+
+
 def is_cache(name: str) -> bool:
     """Whether the name is that of a cache file, the list of sensors of a factored header."""
     return _suffix(name) in _CACHE

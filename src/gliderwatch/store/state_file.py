@@ -22,10 +22,9 @@ from gliderwatch.pipeline import Outcome
 from gliderwatch.store import codec, outbox, retention, segments
 from gliderwatch.store.codec import File, Status, Undelivered, file_of, values
 from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, read_only
-from gliderwatch.store.fields import Fields
 from gliderwatch.store.health import HealthRows
-from gliderwatch.store.layers import LayerRows
 from gliderwatch.store.results import Annotations, Calls, GliderFacts
+from gliderwatch.store.sea import Fields, LayerRows
 from gliderwatch.store.segments import RECENT, Segments
 
 # ----------------------------------------

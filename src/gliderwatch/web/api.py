@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from gliderwatch import __version__
+from gliderwatch.export.dives import assessment_line, iso_ms
 from gliderwatch.messages.formatting import clean
 from gliderwatch.model import Incident
 from gliderwatch.pages.view import GliderView, verdict
-from gliderwatch.service.jsonl import assessment_line, iso
 
 Json = dict[str, Any]
 
@@ -21,9 +21,9 @@ def glider(view: GliderView) -> Json:
         "word": found.word,
         "sentence": found.sentence,
         "since": _time(found.since),
-        "as_of": iso(view.now),
+        "as_of": iso_ms(view.now),
         "heard": _time(view.heard),
-        "fix": None if fix is None else {"t": iso(fix.t), "lat": fix.lat, "lon": fix.lon},
+        "fix": None if fix is None else {"t": iso_ms(fix.t), "lat": fix.lat, "lon": fix.lon},
         "now": None
         if now is None
         else {
@@ -48,8 +48,8 @@ def incident(view: GliderView, i: Incident) -> Json:
         "glider": clean(view.name),
         "kind": str(i.kind),
         "severity": i.severity.name.lower(),
-        "since": iso(i.since),
-        "opened_at": iso(i.opened_at),
+        "since": iso_ms(i.since),
+        "opened_at": iso_ms(i.opened_at),
         "cleared_at": _time(i.cleared_at),
         "dives": i.dives,
         "acknowledged_by": None if ack is None else clean(ack.by),
@@ -57,7 +57,7 @@ def incident(view: GliderView, i: Incident) -> Json:
 
 
 def _time(t: float | None) -> str | None:
-    return None if t is None else iso(t)
+    return None if t is None else iso_ms(t)
 
 
 def _object(**properties: Any) -> Json:

@@ -24,13 +24,13 @@ from gliderwatch.config import Config
 from gliderwatch.delivery import links
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.export import maps
+from gliderwatch.export.dives import assessment_line
 from gliderwatch.figures.coast import world
 from gliderwatch.messages.formatting import clean
 from gliderwatch.pages import render
 from gliderwatch.pages.reading import read_fleet, read_glider
 from gliderwatch.pages.render import Frame
 from gliderwatch.pages.view import GliderView, worst_first
-from gliderwatch.service.jsonl import assessment_line
 from gliderwatch.service.liveness import STALE, is_held, seconds_silent
 from gliderwatch.store.state_file import Store
 from gliderwatch.web import api
