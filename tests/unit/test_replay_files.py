@@ -5,7 +5,7 @@ from __future__ import annotations
 from gliderwatch.errors import Quarantine
 from gliderwatch.model import Segment, SegmentId
 from gliderwatch.service.backlog import Job
-from gliderwatch.service.replay_order import LONGEST, ReplayOrder
+from gliderwatch.service.replay_files import LONGEST, ReplayOrder
 from gliderwatch.slocum.header import Header
 from gliderwatch.store.state_file import File, Status
 from missions import segment

@@ -30,7 +30,8 @@ from gliderwatch.score.grid import Cell, configuration
 from gliderwatch.score.measures import HEALTHY, DiveResult, OpenedIncident, Record
 from gliderwatch.score.sensors import LEFT_OUT, left_out
 from gliderwatch.service import transaction
-from gliderwatch.service.replay import Request, cache_folders, find_files, replay
+from gliderwatch.service.replay import Request, cache_folders, replay
+from gliderwatch.service.replay_files import find_files
 from gliderwatch.service.routing import NOBODY
 from gliderwatch.service.transaction import FileOutcome
 from gliderwatch.simulate.delivery import FileForm, Names, arrivals, deliver, from_glider, write_cache

@@ -1,15 +1,12 @@
-"""A past mission through the same path as a live one, with a state of its own; and what it says when nothing
-could be assessed."""
+"""A past mission through the same path as a live one, with a state of its own."""
 
 from __future__ import annotations
 
-import os
-import shlex
 import tempfile
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -20,128 +17,30 @@ from gliderwatch.delivery.dispatcher import Dispatcher
 from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine, Retry
 from gliderwatch.export.dives import alert_line, assessment_line, write_lines
 from gliderwatch.incidents.constants import GONE
-from gliderwatch.messages.formatting import clean
 from gliderwatch.model import Alert, Hindrance, Segment
-from gliderwatch.navigation.clock import Stamp, corrections, is_same, numbered
 from gliderwatch.params import GliderParams
 from gliderwatch.service import judgement, transaction
 from gliderwatch.service.backlog import Job
 from gliderwatch.service.fields import FleetField, fields_of
 from gliderwatch.service.layers import layers_of, wants_science
 from gliderwatch.service.liveness import alive_path
-from gliderwatch.service.replay_order import Log, ReplayOrder, find_logs, read_logs
+from gliderwatch.service.replay_files import (
+    Log,
+    ReplayOrder,
+    correct_clocks,
+    find_files,
+    find_logs,
+    read_logs,
+)
 from gliderwatch.service.routing import NOBODY, Routing, routing_of
 from gliderwatch.service.runtime import OceanCache
-from gliderwatch.slocum import folders
 from gliderwatch.slocum.caches import SensorLists, lists_folder
 from gliderwatch.slocum.decode import Decoder
-from gliderwatch.slocum.folders import kind, rank
+from gliderwatch.slocum.folders import rank
 from gliderwatch.slocum.header import read_header
 from gliderwatch.store.database import MEMORY, refuse_foreign
 from gliderwatch.store.outbox import Outbox
 from gliderwatch.store.state_file import File, Status, Store
-
-# ----------------------------------------
-# A replay that assessed nothing: why, in one line, and what to do about it.
-
-_ABOVE = 4
-"""Folders above the one replayed in which cache files are looked for, with the folders beside these."""
-_MOST = 2000
-"""Entries of a folder that are looked at."""
-_SHOWN = 3
-
-
-def unassessed(store: Store, folders: Iterable[Path]) -> str | None:
-    """Why the replay of `folders` assessed no dive, with the cure; None where it assessed one."""
-    if any(store.extent(glider)[1] for glider in store.gliders()):
-        return None
-    left_out = {s: store.files(s) for s in (Status.WAITING, Status.UNKNOWN, Status.QUARANTINED)}
-    status = max(left_out, key=lambda s: len(left_out[s]))
-    files = left_out[status]
-    if not files:
-        return "nothing was assessed: the files were read, but none holds a dive"
-    said = {Status.WAITING: _waiting, Status.UNKNOWN: _unknown_gliders, Status.QUARANTINED: _bad}[status]
-    return f"nothing was assessed: {said(files, folders)}"
-
-
-def _waiting(files: Sequence[File], folders: Iterable[Path]) -> str:
-    wanted = {file.crc.lower() for file in files if file.crc}
-    if not wanted:
-        return f"{_number(files)} cannot be read now ({clean(files[0].reason)}): try again later"
-    place = nearby(wanted, folders)
-    cure = "name its folder: --cache FOLDER" if place is None else f"add --cache {shlex.quote(_short(place))}"
-    lacking = _some(f"{crc}.cac" for crc in wanted)
-    return f"{_number(files)} {'wait' if len(files) > 1 else 'waits'} for {lacking}: {cure}"
-
-
-def _unknown_gliders(files: Sequence[File], _folders: Iterable[Path]) -> str:
-    gliders = {file.glider for file in files}
-    return (
-        f"{_number(files)} of {_some(gliders)}, not in the configuration: "
-        "add the name under `gliders`, or leave -c out"
-    )
-
-
-def _bad(files: Sequence[File], _folders: Iterable[Path]) -> str:
-    return (
-        f"{_number(files)} cannot be used ({clean(files[0].reason)}): "
-        "name a folder with flight data of a glider (sbd, scd, mbd, mcd, dbd, dcd)"
-    )
-
-
-def _number(files: Sequence[File]) -> str:
-    return "1 file" if len(files) == 1 else f"{len(files)} files"
-
-
-def _some(words: Iterable[str]) -> str:
-    found = sorted(words)
-    more = f" and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
-    return ", ".join(clean(word, 60) for word in found[:_SHOWN]) + more
-
-
-def _short(path: Path) -> str:
-    """A path as one would type it here."""
-    relative = os.path.relpath(path)
-    return relative if len(relative) < len(str(path)) else str(path)
-
-
-def nearby(crcs: Collection[str], folders: Iterable[Path]) -> Path | None:
-    """The folder that holds most of the cache files of some checksums (lower case), in, above or beside the
-    `folders`; None where none is found."""
-    held = Counter({place: n for place in _places(folders) if (n := len(_caches(place) & set(crcs)))})
-    return held.most_common(1)[0][0] if held else None
-
-
-def _places(folders: Iterable[Path]) -> Iterator[Path]:
-    for folder in folders:
-        start = folder.resolve()
-        for above in (start, *start.parents)[: _ABOVE + 1]:
-            yield above
-            yield from (Path(entry.path) for entry in _entries(above) if entry.is_dir())
-
-
-def _caches(folder: Path) -> set[str]:
-    """The checksums of the cache files in a folder, as their names tell."""
-    return {Path(entry.name).stem.lower() for entry in _entries(folder) if folders.is_cache(entry.name)}
-
-
-def _entries(folder: Path) -> list[os.DirEntry[str]]:
-    try:
-        with os.scandir(folder) as found:
-            return [entry for entry, _ in zip(found, range(_MOST), strict=False)]
-    except OSError:
-        return []
-
-
-# ----------------------------------------
-# A past mission through the same path as a live one, with a state of its own.
-
-# ----------------------------------------
-# The files of several gliders in the order of their sending: for a replay, whose time is theirs.
-
-
-# ----------------------------------------
-# A past mission through the same path as a live one, with a state of its own.
 
 STATE = "replay.sqlite"
 """Name of the state file in the folder of results: another one than a daemon's usual."""
@@ -229,21 +128,6 @@ def replay(
         if request.out is not None:
             _write(request.out, report.store)
     return report
-
-
-def find_files(folders: Iterable[Path]) -> list[Path]:
-    """All flight data files below some folders, each once.
-
-    The folders may be links. Below them a link is treated as the service does: a file that is one is named
-    and left alone, a folder that is one is not looked into.
-    """
-    found = {
-        path: None
-        for folder in folders
-        for path in sorted([folder] if folder.is_file() else folder.rglob("*"))
-        if kind(path.name) is not None and (path.is_symlink() or not path.is_dir())
-    }
-    return list(found)
 
 
 def cache_folders(request: Request) -> list[Path]:
@@ -354,28 +238,8 @@ def _judge_all(
             jobs.append(Job(found, read_header(Path(found.path)), MissingCache(found.crc, caches)))
         else:
             _note(found, report, request, on_file)
-    _correct_clocks(jobs)
+    correct_clocks(jobs)
     return sorted(jobs, key=lambda j: (j.opened_at, j.header.id, -rank(j.header.kind), j.file.path))
-
-
-def _correct_clocks(jobs: Sequence[Job]) -> None:
-    """Give the files of a glider whose clock fell back their turn: when they were sent, not years before."""
-    missions: dict[tuple[str, str], dict[str, list[list[Job]]]] = {}
-    for job in jobs:
-        mission = job.header.id.glider, numbered(job.header.id.name)[0]
-        segments = missions.setdefault(mission, {}).setdefault(job.header.id.name, [])
-        copies = next((s for s in segments if is_same(s[0].header.id, job.header.id)), None)
-        if copies is None:
-            segments.append([job])
-        else:
-            copies.append(job)
-    for by_name in missions.values():
-        segments = [copies for found in by_name.values() for copies in found]
-        opened = [(copies[0].header.id.name, copies[0].header.id.opened_at) for copies in segments]
-        stamps = [Stamp(numbered(name)[1], t, t) for name, t in opened]
-        for copies, correction in zip(segments, corrections(stamps), strict=True):
-            for job in copies:
-                job.offset = correction.offset
 
 
 def _note(

@@ -1,21 +1,57 @@
-"""The order in which a replay takes files and logs of calls: that of their sending."""
+"""The files and logs of calls that a replay finds, in the order of their sending."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from gliderwatch.model import Segment
+from gliderwatch.navigation.clock import Stamp, corrections, is_same, numbered
 from gliderwatch.service import judgement
 from gliderwatch.service.backlog import Job
 from gliderwatch.slocum.calls import Dialog
-from gliderwatch.slocum.folders import is_log
+from gliderwatch.slocum.folders import is_log, kind
 from gliderwatch.store.state_file import File, Store
 
 LONGEST = 2 * 86400.0
 """Seconds after which a file is sent at the latest: if the next is opened later, there was a pause."""
+
+
+def find_files(folders: Iterable[Path]) -> list[Path]:
+    """All flight data files below some folders, each once.
+
+    The folders may be links. Below them a link is treated as the service does: a file that is one is named
+    and left alone, a folder that is one is not looked into.
+    """
+    found = {
+        path: None
+        for folder in folders
+        for path in sorted([folder] if folder.is_file() else folder.rglob("*"))
+        if kind(path.name) is not None and (path.is_symlink() or not path.is_dir())
+    }
+    return list(found)
+
+
+def correct_clocks(jobs: Sequence[Job]) -> None:
+    """Give the files of a glider whose clock fell back their turn: when they were sent, not years before."""
+    missions: dict[tuple[str, str], dict[str, list[list[Job]]]] = {}
+    for job in jobs:
+        mission = job.header.id.glider, numbered(job.header.id.name)[0]
+        segments = missions.setdefault(mission, {}).setdefault(job.header.id.name, [])
+        copies = next((s for s in segments if is_same(s[0].header.id, job.header.id)), None)
+        if copies is None:
+            segments.append([job])
+        else:
+            copies.append(job)
+    for by_name in missions.values():
+        segments = [copies for found in by_name.values() for copies in found]
+        opened = [(copies[0].header.id.name, copies[0].header.id.opened_at) for copies in segments]
+        stamps = [Stamp(numbered(name)[1], t, t) for name, t in opened]
+        for copies, correction in zip(segments, corrections(stamps), strict=True):
+            for job in copies:
+                job.offset = correction.offset
 
 
 class ReplayOrder:
