@@ -15,8 +15,12 @@ from compliance_checker.runner import CheckSuite, ComplianceChecker
 from pyais import decode
 
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.export import ais, dives, maps, netcdf
+from gliderwatch.export import ais, dives, maps, netcdf, sections
 from gliderwatch.incidents.notices import DriftEllipse
+from gliderwatch.layers.advice import LayerAdvice
+from gliderwatch.layers.band import Band, Mode
+from gliderwatch.layers.composite import Layer
+from gliderwatch.layers.section import Section
 from gliderwatch.params import Attention
 from unit.test_pages import HOSTILE, LATE, NOW, dive, view
 
@@ -105,6 +109,32 @@ def test_netcdf_passes_the_checker_of_its_conventions(tmp_path):
     # nobody has named who publishes it; a trajectory of dives has no depth
     open_still = ("creator_", "publisher_", "institution", "project", "license", "acknowledg", "geospatial_")
     assert [m for m in found["medium"] if not m.startswith(open_still)] == []
+
+
+def advised(band):
+    layer = Layer(5.0, 8.0, -0.4, 1.0)
+    return LayerAdvice(
+        NOW, "temperature", Mode.TRACK, Band(2.0, 90.0), band, 2, 10.0, (layer,) if band else ()
+    )
+
+
+def test_a_section_with_its_layers_is_read_back_and_passes_the_checker(tmp_path):
+    dives = view().dives
+    edges = np.arange(0.0, 12.0, 1.0)
+    value = np.tile(20.0 - edges[:-1], (2, 1))
+    value[1, -1] = np.nan
+    t = np.array([dives[0].t_surface, dives[-1].t_surface])
+    advice = [advised(Band(3.0, 10.0)), advised(None)]
+    sections.write(tmp_path / "x.nc", "electa", Section(t, edges, value), advice, dives, NOW)
+    with xr.open_dataset(tmp_path / "x.nc") as data:
+        assert np.isnan(data.temperature.values[1, -1])
+        assert data.temperature.values[0] == pytest.approx(value[0])
+        assert (data.layer_top.values[0, 0], data.band_bottom.values[0]) == (5.0, 10.0)
+        assert np.isnan([data.layer_top.values[1, 0], data.band_top.values[1]]).all()
+        assert float(data.lat[0]) == pytest.approx(dives[0].lat)
+    assert remarks(tmp_path / "x.nc", "cf:1.8") == {"high": [], "medium": [], "low": []}
+    with pytest.raises(GliderwatchError, match="no layers with a position"):
+        sections.write(tmp_path / "x.nc", "electa", Section(t[:0], edges, value[:0]), [], dives, NOW)
 
 
 def test_a_glider_without_a_place_has_no_trajectory(tmp_path):

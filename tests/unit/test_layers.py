@@ -12,6 +12,7 @@ from gliderwatch.layers.band import Band, Method, Mode, Tracking, cost_slope, fo
 from gliderwatch.layers.casts import Cast, bin_of, split
 from gliderwatch.layers.composite import composite, layers_of
 from gliderwatch.layers.constants import LEAST_BIN
+from gliderwatch.layers.section import section
 from gliderwatch.model import Series, readonly
 
 
@@ -212,3 +213,23 @@ def test_full_casts_see_a_jump_at_once() -> None:
     segments = [casts_in(warm_above(20.0, 30.0)), *[casts_in(warm_above(70.0, 80.0)) for _ in range(3)]]
     found = flown.compare(segments, "temperature")["composite, two full casts"]
     assert [f.coverage for f in found] == [1.0, 1.0, 1.0, 1.0]
+
+
+def test_a_section_is_the_mean_of_the_casts_of_each_segment() -> None:
+    depth = readonly(np.arange(0.0, 40.0, 0.5))
+    cold, warm = (Cast(depth, depth, readonly(np.full(len(depth), v))) for v in (10.0, 12.0))
+    found = section([(cold, warm), (), (cold.within(0.0, 20.0),)])
+    assert found.t == pytest.approx([19.75, 10.0])
+    assert found.edges == pytest.approx(np.arange(0.0, 41.0, 1.0))
+    assert found.value[0] == pytest.approx(11.0)
+    assert np.isnan(found.value[1, 21:]).all()
+    assert found.value[1, :20] == pytest.approx(10.0)
+
+
+def test_a_section_of_nothing_has_no_profile() -> None:
+    assert section([]).value.shape == (0, 1)
+
+
+def test_a_section_of_a_deep_glider_has_coarser_bins() -> None:
+    depth = readonly(np.arange(0.0, 1000.0, 0.5))
+    assert len(section([(Cast(depth, depth, depth),)]).edges) == 201  # layers.constants.MOST_DEPTHS

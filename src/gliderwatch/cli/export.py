@@ -72,8 +72,8 @@ def looking(config: Config | None, state: Path | None, at: str | None) -> Iterat
 @contextmanager
 def viewing(
     config_path: Path | None, state: Path | None, at: str | None, glider: str | None
-) -> Iterator[tuple[GliderView, ...]]:
-    """What is known of one glider or of all. Raises GliderwatchError where nothing is."""
+) -> Iterator[tuple[Store, tuple[GliderView, ...]]]:
+    """The state file, and what is known of one glider or of all. Raises GliderwatchError where nothing is."""
     from gliderwatch.pages import reading
     from gliderwatch.params import Attention
 
@@ -86,8 +86,12 @@ def viewing(
             )
         wanted = names if glider is None else [glider.lower()]
         attention = config.attention if config is not None else lambda _name: Attention()
-        yield tuple(
-            reading.read_glider(store, name, attention(name), now, dives=_ALL, whole=False) for name in wanted
+        yield (
+            store,
+            tuple(
+                reading.read_glider(store, name, attention(name), now, dives=_ALL, whole=False)
+                for name in wanted
+            ),
         )
 
 
@@ -100,7 +104,7 @@ def viewing(
 @click.option(
     "--format",
     "form",
-    type=click.Choice(["geojson", "kml", "csv", "netcdf"]),
+    type=click.Choice(["geojson", "kml", "csv", "netcdf", "layers"]),
     required=True,
     help="The format.",
 )
@@ -118,17 +122,20 @@ def export(
 ) -> None:
     """Write tracks, dives, and where gliders are and come up next, for other programs.
 
-    netcdf: one glider, one row a dive, by CF and ACDD. csv: one row a dive. geojson, kml: for maps.
+    netcdf: one glider, one row a dive, by CF and ACDD. layers: the same of its section and the layers in it.
+    csv: one row a dive. geojson, kml: for maps.
     """
-    from gliderwatch.export import dives, maps, netcdf
+    from gliderwatch.export import dives, maps
 
     if out is not None:
         out.parent.mkdir(parents=True, exist_ok=True)
-    with viewing(config_path, state, at, glider) as views:
-        if form == "netcdf":
+    with viewing(config_path, state, at, glider) as (store, views):
+        if form in ("netcdf", "layers"):
             if out is None or len(views) != 1:
-                raise click.UsageError("netcdf is of one glider, into a file: name the GLIDER and --out FILE")
-            netcdf.write(out, views[0].name, views[0].dives, views[0].now)
+                raise click.UsageError(
+                    f"{form} is of one glider, into a file: name the GLIDER and --out FILE"
+                )
+            _write_netcdf(out, form, store, views[0])
             return
         if form == "csv":
             text = dives.as_csv([dive for view in views for dive in view.dives])
@@ -138,6 +145,17 @@ def export(
         click.echo(text, nl=not text.endswith("\n"))
     else:
         out.write_text(text, encoding="utf-8")
+
+
+def _write_netcdf(out: Path, form: str, store: Store, view: GliderView) -> None:
+    from gliderwatch.export import netcdf, sections
+    from gliderwatch.pages import reading
+
+    if form == "netcdf":
+        netcdf.write(out, view.name, view.dives, view.now)
+        return
+    found, advice = reading.read_section(store, view.name, _ALL)
+    sections.write(out, view.name, found, advice, view.dives, view.now)
 
 
 @click.command(epilog=example("gliderwatch where electa", "gliderwatch where electa --ais 992441234"))
@@ -164,7 +182,7 @@ def where(
 
     if ais is not None and glider is None:
         raise click.UsageError("--ais is of one glider: name it")
-    with viewing(config_path, state, at, glider) as views:
+    with viewing(config_path, state, at, glider) as (_, views):
         found = [(view, view.whereabouts()) for view in views]
     if as_json:
         listed = [

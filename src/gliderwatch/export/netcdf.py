@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 
 import netCDF4
@@ -19,10 +18,10 @@ FLAGS = {-127: "no_judgement", 0: "normal", 1: "speed_out_of_range", 2: "measure
 SINCE = "seconds since 1970-01-01T00:00:00Z"
 _FILL = -9999.0
 _Value = Callable[[Assessment], float | None]
-_AXES: tuple[tuple[str, str, str, str, str, _Value], ...] = (
-    ("time", "T", "time", "surfacing that ended the dive", SINCE, lambda d: d.t_surface),
-    ("lat", "Y", "latitude", "latitude of the fix after it", "degrees_north", lambda d: d.lat),
-    ("lon", "X", "longitude", "longitude of the fix after it", "degrees_east", lambda d: d.lon),
+_AXES = (
+    ("time", "T", "time", "time of the surfacing, or of the profile", SINCE),
+    ("lat", "Y", "latitude", "latitude then", "degrees_north"),
+    ("lon", "X", "longitude", "longitude then", "degrees_east"),
 )
 
 
@@ -38,18 +37,22 @@ def write(path: Path, glider: str, dives: Sequence[Assessment], now: float) -> N
         )
     try:
         with netCDF4.Dataset(path, "w", format="NETCDF4_CLASSIC") as data:
-            _coordinates(data, clean(glider), placed)
+            t, lat, lon = (
+                _values(placed, value) for value in (lambda d: d.t_surface, lambda d: d.lat, lambda d: d.lon)
+            )
+            coordinates(data, clean(glider), "obs", {"time": t, "lat": lat, "lon": lon})
             _flags(data, placed)
             for column in COLUMNS:
                 _column(data, column, placed)
-            data.setncatts(_about(clean(glider), placed, now))
+            data.setncatts(_about(clean(glider), about(clean(glider), t, lat, lon, now)))
     except (OSError, RuntimeError) as error:
         raise GliderwatchError(f"{path} cannot be written: {error}") from None
 
 
-def _coordinates(data: netCDF4.Dataset, glider: str, dives: Sequence[Assessment]) -> None:
+def coordinates(data: netCDF4.Dataset, glider: str, dimension: str, values: dict[str, Array]) -> None:
+    """The name of the glider, the sphere, and the `values` (n,) of `time` (s), `lat`, `lon` (degrees)."""
     name = glider.encode() or b"unknown"
-    data.createDimension("obs", len(dives))
+    data.createDimension(dimension, len(values["time"]))
     data.createDimension("name_strlen", len(name))
     trajectory = data.createVariable("trajectory", "S1", ("name_strlen",))
     trajectory.setncatts({"long_name": "name of the glider", "cf_role": "trajectory_id"})
@@ -65,11 +68,13 @@ def _coordinates(data: netCDF4.Dataset, glider: str, dives: Sequence[Assessment]
         }
     )
     crs[...] = 0
-    for short, axis, standard, long_name, unit, value in _AXES:
+    for short, axis, standard, long_name, unit in _AXES:
         attributes = {"standard_name": standard, "long_name": long_name, "units": unit, "axis": axis}
         attributes |= {"coverage_content_type": "coordinate"}
         attributes |= {"calendar": "standard"} if short == "time" else {}
-        _variable(data, short, _values(dives, value), attributes, fill=False)
+        made = data.createVariable(short, "f8", (dimension,))
+        made.setncatts(attributes)
+        made[:] = values[short]
 
 
 def _column(data: netCDF4.Dataset, column: Column, dives: Sequence[Assessment]) -> None:
@@ -78,9 +83,7 @@ def _column(data: netCDF4.Dataset, column: Column, dives: Sequence[Assessment]) 
         attributes["standard_name"] = column.standard_name
     if column.unit.startswith("seconds since"):
         attributes |= {"calendar": "standard", "coverage_content_type": "coordinate"}
-    else:
-        attributes |= {"coordinates": "time lat lon", "coverage_content_type": "modelResult"}
-    _variable(data, column.name, _values(dives, column.value), attributes)
+    variable(data, column.name, ("obs",), _values(dives, column.value), attributes)
 
 
 def _flags(data: netCDF4.Dataset, dives: Sequence[Assessment]) -> None:
@@ -98,40 +101,50 @@ def _flags(data: netCDF4.Dataset, dives: Sequence[Assessment]) -> None:
     variable[:] = np.array([-127 if d.flag is None else int(d.flag) for d in dives], dtype="i1")
 
 
-def _variable(
-    data: netCDF4.Dataset, name: str, values: Array, attributes: dict[str, str], *, fill: bool = True
+def variable(
+    data: netCDF4.Dataset, name: str, dimensions: tuple[str, ...], values: Array, attributes: dict[str, str]
 ) -> None:
-    variable = data.createVariable(name, "f8", ("obs",), fill_value=_FILL if fill else None)
-    variable.setncatts(attributes)
-    if fill:
-        variable.setncattr("grid_mapping", "crs")
-    variable[:] = np.where(np.isfinite(values), values, _FILL)
+    """A variable that is made by the program along the track; what is not finite is a fill value."""
+    made = data.createVariable(name, "f8", dimensions, fill_value=_FILL)
+    made.setncatts(
+        {"coordinates": "time lat lon", "coverage_content_type": "modelResult", "grid_mapping": "crs"}
+        | attributes
+    )
+    made[:] = np.where(np.isfinite(values), values, _FILL)
 
 
 def _values(dives: Sequence[Assessment], value: _Value) -> Array:
     return np.array([np.nan if (x := value(d)) is None else x for d in dives], dtype=float)
 
 
-def _about(glider: str, dives: Sequence[Assessment], now: float) -> dict[str, object]:
-    """The global attributes."""
-    lat, lon = _values(dives, lambda d: d.lat), _values(dives, lambda d: d.lon)
-    t = _values(dives, lambda d: d.t_surface)
-    made = datetime.fromtimestamp(now, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-    return {
-        "Conventions": "CF-1.8, ACDD-1.3",
+def _about(glider: str, common: dict[str, object]) -> dict[str, object]:
+    """The global attributes of a trajectory of dives."""
+    return common | {
         "featureType": "trajectory",
         "title": f"Speed through the water and current of the underwater glider {glider}",
         "summary": "One row a dive of a Slocum glider: its speed through the water and the mean current as "
         "estimated from satellite fixes, headings and the current that the glider reckons, with standard "
         "errors, and a flag that says whether the speed is out of its normal range.",
         "keywords": "EARTH SCIENCE > OCEANS > OCEAN CIRCULATION > OCEAN CURRENTS",
+        "id": f"gliderwatch-{glider}-{str(common['time_coverage_start'])[:10]}",
+        "comment": "flag -127: the dive could not be judged",
+    }
+
+
+def about(glider: str, t: Array, lat: Array, lon: Array, now: float) -> dict[str, object]:
+    """The global attributes that all files of a glider have: who made it, when and where.
+
+    `t` (n,) in s, `lat` and `lon` (n,) in degrees.
+    """
+    made = iso(now)
+    return {
+        "Conventions": "CF-1.8, ACDD-1.3",
         "keywords_vocabulary": "GCMD Science Keywords",
-        "id": f"gliderwatch-{glider}-{iso(float(t[0]))[:10]}",
         "naming_authority": "gliderwatch",
         "source": "underwater glider",
+        "platform": glider,
         "processing_level": "estimated from real-time data, flagged automatically",
         "history": f"{made} written by gliderwatch {__version__}",
-        "comment": "flag -127: the dive could not be judged",
         "standard_name_vocabulary": "CF Standard Name Table v93",
         "date_created": made,
         "date_modified": made,

@@ -60,3 +60,5 @@ LEAST_BAND = 3.0
 """m: a band of less height is none: a Slocum overshoots its turns by 1 to 3 m."""
 WRONG_ECHOES = 0.1
 """Part of the depths of the bottom that may be too shallow: usf-sam had such, by 4 m, one in ten."""
+MOST_DEPTHS = 200
+"""Bins of a section at the most: a picture of it has no more lines."""

@@ -8,6 +8,9 @@ from pathlib import Path
 from gliderwatch.incidents.acknowledgement import with_mute
 from gliderwatch.incidents.constants import RECENT
 from gliderwatch.incidents.overdue import expected_call, outlook
+from gliderwatch.layers.advice import LayerAdvice
+from gliderwatch.layers.section import Section, section
+from gliderwatch.layers.water import casts_of
 from gliderwatch.pages.view import GliderView
 from gliderwatch.params import Attention
 from gliderwatch.store.state_file import Store
@@ -58,6 +61,20 @@ def read_fleet(
 ) -> tuple[GliderView, ...]:
     """What the page of the fleet shows of each glider."""
     return tuple(read_glider(store, name, attention(name), now, dives=dives, whole=False) for name in names)
+
+
+def read_section(store: Store, name: str, segments: int) -> tuple[Section, tuple[LayerAdvice, ...]]:
+    """The section of the last `segments` of a glider, and what was found and advised after each profile.
+
+    It is of the sensor whose layers were found last; both are empty where layers are off.
+
+    Raises StateError where the state file cannot be read.
+    """
+    rows = store.layers.segments(name, segments)
+    sensor = rows[-1][1].advice.sensor if rows else ""
+    held = [(casts_of(store.segments.get(identity), sensor), one.advice) for identity, one in rows]
+    held = [(casts, advice) for casts, advice in held if casts and advice.sensor == sensor]
+    return section([casts for casts, _ in held]), tuple(advice for _, advice in held)
 
 
 def last_news(store: Store) -> float | None:

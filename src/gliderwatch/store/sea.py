@@ -219,3 +219,15 @@ class LayerRows:
         """The last `n` of a glider, the newest first."""
         sql = "SELECT data FROM layers WHERE glider = ? ORDER BY opened_at DESC, segment DESC LIMIT ?"
         return list(values(self._db, sql, (glider, n), Layered))
+
+    def segments(self, glider: str, n: int) -> list[tuple[SegmentId, Layered]]:
+        """The last `n` segments of a glider with what was found in each, in order of time."""
+        sql = (
+            "SELECT opened_at, segment, data FROM layers WHERE glider = ? "
+            "ORDER BY opened_at DESC, segment DESC LIMIT ?"
+        )
+        rows = self._db.execute(sql, (glider, n)).fetchall()
+        return [
+            (SegmentId(row["opened_at"], glider, row["segment"]), codec.plain_decode(row["data"], Layered))
+            for row in reversed(rows)
+        ]
