@@ -299,7 +299,7 @@ class TestNothingBreaksOut:
             assert not any(unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp") for c in text)
             text.encode("utf-8")
         reader = Reader(made.html)
-        allowed = {"html", "head", "meta", "body", "p", "b", "br", "ul", "li", "a"}
+        allowed = {"html", "head", "meta", "body", "p", "b", "br", "ul", "li", "a", "hr"}
         assert reader.tags <= allowed
         assert all(link.startswith("https://www.openstreetmap.org/?mlat=") for link in reader.links)
         assert made.title in reader.shown

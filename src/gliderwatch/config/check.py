@@ -160,6 +160,9 @@ def _channels(config: Config) -> _Findings:
         found = problem(url)
         if found:
             yield _error(key, found, "compare with https://github.com/caronc/apprise/wiki")
+        elif channel.pictures and not url.startswith(("mailto:", "mailtos:")):
+            cure = "remove `pictures`, or name a mail channel"
+            yield _warning(f"channels.{name}.pictures", "only mails have pictures", cure)
 
 
 def _recipients(config: Config) -> _Findings:

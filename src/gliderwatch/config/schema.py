@@ -519,6 +519,11 @@ class Channel(Section):
         description="Apprise URL. Any part may be `${NAME}` (environment), `${file:PATH}` or "
         "`${credential:NAME}` (systemd); or `{file: PATH}` for the whole URL."
     )
+    pictures: Annotated[bool, Field(strict=True)] = Field(
+        default=False,
+        description="Whether its mails hold a plot of the speed and a map, some 80 kB. They go without where "
+        "these are not drawn within 2 s. Other services than mail get none.",
+    )
 
 
 class QuietHours(Section):

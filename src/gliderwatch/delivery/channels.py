@@ -9,12 +9,14 @@ from __future__ import annotations
 import logging
 import re
 import threading
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Protocol
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from gliderwatch.delivery.mail import (
     DeliveryError,
     MailServer,
+    Picture,
     first,
     is_permanent,
     mail_server,
@@ -48,12 +50,26 @@ _LIVE = re.compile(r"@(?=\w)|\](?=\()")
 """Where a name from a file could begin a mention or a link, in services that read every text as Markdown."""
 
 
-class Channel:
-    """One way to reach people. Not for use by several threads at once."""
+class Illustrator(Protocol):
+    """Who draws the pictures of mails (`service.mail_pictures`)."""
 
-    def __init__(self, name: str, url: str) -> None:
+    def prepare(self) -> None:
+        """Load what the first picture would otherwise wait for."""
+        ...
+
+    def of(self, alert: Alert) -> Sequence[Picture]:
+        """The pictures of a message, soon; raises nothing."""
+        ...
+
+
+class Channel:
+    """One way to reach people; its mails have the pictures of an `illustrator`. Not for use by several
+    threads at once."""
+
+    def __init__(self, name: str, url: str, illustrator: Illustrator | None = None) -> None:
         self.name = name
         self._url = url
+        self._illustrator = illustrator
         self._service: Any = None
         self._mail: MailServer | None = None
         self._accepted: dict[str, set[str]] = {}
@@ -70,6 +86,8 @@ class Channel:
         if self._service is None:
             self._service, _ = _service(self._url)
             self._mail = mail_server(self._service)
+            if self._illustrator is not None and self._mail is not None:
+                self._illustrator.prepare()
 
     def reach(self) -> bool:
         """Whether the server of a mail channel answers and lets us in; nothing is sent.
@@ -104,7 +122,8 @@ class Channel:
         refused = self._refused.setdefault(alert.id, {})
         done = self._accepted.setdefault(alert.id, set())
         rest = [address for address in recipients if address not in done | set(refused)]
-        answers = submit(server, alert, rest) if rest else {}
+        pictures = self._illustrator.of(alert) if self._illustrator is not None and rest else ()
+        answers = submit(server, alert, rest, pictures) if rest else {}
         later = {address: answer for address, answer in answers.items() if not is_permanent(answer[0])}
         done.update(set(rest) - set(answers))
         refused.update({address: answer for address, answer in answers.items() if address not in later})

@@ -20,6 +20,7 @@ from typing import Literal, Protocol, cast
 from urllib.parse import SplitResult, parse_qsl, unquote, urlsplit
 
 from gliderwatch.errors import GliderwatchError
+from gliderwatch.messages.template import with_pictures
 from gliderwatch.model import Alert
 
 # ----------------------------------------
@@ -48,6 +49,15 @@ class Envelope:
         return tuple(dict.fromkeys([*people, *self.bcc]))
 
 
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A picture in a mail: the name of its file, what it shows in words, and the PNG."""
+
+    name: str
+    shows: str
+    png: bytes = field(repr=False)
+
+
 def message_id(key: str, sender: str) -> str:
     """The Message-ID of an alert, or the root of an incident's thread: the same for the same key.
 
@@ -57,8 +67,8 @@ def message_id(key: str, sender: str) -> str:
     return f"<{sha256(key.encode('utf-8', 'replace')).hexdigest()[:32]}.gliderwatch@{domain}>"
 
 
-def compose(alert: Alert, envelope: Envelope) -> EmailMessage:
-    """The message with text and HTML as alternatives.
+def compose(alert: Alert, envelope: Envelope, pictures: Sequence[Picture] = ()) -> EmailMessage:
+    """The message with text and HTML as alternatives, and ``pictures`` in the HTML.
 
     Every message of an incident refers to one root, made of the incident's id: the alert with that
     very id where there is one, else a message that never existed, which mail clients thread by as well.
@@ -82,7 +92,14 @@ def compose(alert: Alert, envelope: Envelope) -> EmailMessage:
         if name not in mail:
             mail[name] = value
     mail.set_content(alert.body, cte="quoted-printable")
-    mail.add_alternative(alert.html, subtype="html", cte="quoted-printable")
+    names = [(f"{picture.name}.{own[1:17]}@gliderwatch", picture) for picture in pictures]  # never folded
+    html = with_pictures(alert.html, [(f"cid:{name}", picture.shows) for name, picture in names])
+    mail.add_alternative(html, subtype="html", cte="quoted-printable")
+    part = cast(EmailMessage, mail.get_body(("html",)))
+    for name, picture in names:
+        part.add_related(
+            picture.png, "image", "png", cid=f"<{name}>", filename=picture.name, disposition="inline"
+        )
     return mail
 
 
@@ -202,10 +219,12 @@ class DeliveryError(GliderwatchError):
         self.permanent, self.partly = permanent, partly
 
 
-def submit(server: MailServer, alert: Alert, recipients: list[str]) -> dict[str, tuple[int, bytes]]:
+def submit(
+    server: MailServer, alert: Alert, recipients: list[str], pictures: Sequence[Picture] = ()
+) -> dict[str, tuple[int, bytes]]:
     """Hand the mail to the server; returns who was refused. Raises DeliveryError when nobody was served."""
     try:
-        mail = compose(alert, server.envelope)
+        mail = compose(alert, server.envelope, pictures)
     except (ValueError, MessageError) as error:
         raise DeliveryError(f"cannot be written as a mail: {error}", permanent=True) from None
     with _session(server) as smtp:

@@ -31,9 +31,9 @@ with which it takes no more than `COAST` characters."""
 COAST = 40_000
 STEPS = (30.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 1 / 6, 1 / 12, 1 / 30, 1 / 60)
 """Degrees between two lines of the graticule: whole minutes."""
-ARROW = 60.0
+ARROW = 300.0
 """Units of the picture for a current of 1 m/s, if the greatest one is not longer than `LONGEST`."""
-LONGEST = 50.0
+LONGEST = 45.0
 STYLE = """\
 .map{background:var(--sea);font:12px system-ui,sans-serif}.map text{fill:var(--ink)}
 .map .land{fill:var(--land);stroke:var(--shore);stroke-width:.8}
@@ -219,16 +219,20 @@ def _area(view: Frame, area: DriftEllipse, kind: str, label: str) -> str:
 
 def _currents(view: Frame, arrows: Sequence[Arrow]) -> Iterable[str]:
     """An arrow for each current, all of one scale, with the scale below."""
-    greatest = max((hypot(a.u, a.v) for a in arrows), default=0.0)
-    if greatest < 0.005:
+    per, shown = arrow_scale(arrows)
+    if not per:
         return
-    per = min(ARROW, LONGEST / greatest)
     for arrow in arrows:
         x, y = view.xy(*arrow.place).tolist()
         yield _arrow(x, y, arrow.u * per, -arrow.v * per)
-    shown = _round(greatest)
     yield _arrow(WIDTH - 12 - shown * per, HEIGHT - 30, shown * per, 0.0)
     yield _text(WIDTH - 12, HEIGHT - 36, f"{shown:g} m/s", "end", "halo faint")
+
+
+def arrow_scale(arrows: Sequence[Arrow]) -> tuple[float, float]:
+    """Units of the picture for 1 m/s, and the current (m/s) that its scale shows; 0 where none flows."""
+    greatest = max((hypot(a.u, a.v) for a in arrows), default=0.0)
+    return (0.0, 0.0) if greatest < 0.005 else (min(ARROW, LONGEST / greatest), round_number(greatest))
 
 
 def _arrow(x: float, y: float, dx: float, dy: float) -> str:
@@ -266,19 +270,31 @@ def _marks(view: Frame, marks: Sequence[Mark]) -> Iterable[str]:
 
 
 def _graticule(view: Frame) -> Iterable[str]:
+    for x, label in meridians(view):
+        yield f'<path class="grid" d="M{x:.1f} 0V{HEIGHT:g}"/>'
+        if 24 < x < WIDTH - 24:
+            yield _text(x, 11, label, "middle", "faint halo")
+    for y, label in parallels(view):
+        yield f'<path class="grid" d="M0 {y:.1f}H{WIDTH:g}"/>'
+        if 24 < y < HEIGHT - 40:
+            yield _text(3, y - 3, label, "start", "faint halo")
+
+
+def meridians(view: Frame) -> Iterable[tuple[float, str]]:
+    """Where lines of equal longitude stand in the picture, and which they are."""
     box = view.box()
     step = next((s for s in STEPS if (box.east - box.west) / s >= 3), STEPS[-1])
     for k in range(ceil(box.west / step), floor(box.east / step) + 1):
         x = float(view.straight(view.lat, k * step)[0])
-        yield f'<path class="grid" d="M{x:.1f} 0V{HEIGHT:g}"/>'
-        if 24 < x < WIDTH - 24:
-            yield _text(x, 11, angle((k * step + 180) % 360 - 180, "E", "W"), "middle", "faint halo")
+        yield x, angle((k * step + 180) % 360 - 180, "E", "W")
+
+
+def parallels(view: Frame) -> Iterable[tuple[float, str]]:
+    """Where lines of equal latitude lie in the picture, and which they are."""
+    box = view.box()
     step = next((s for s in STEPS if (box.north - box.south) / s >= 2.5), STEPS[-1])
     for k in range(ceil(box.south / step), floor(box.north / step) + 1):
-        y = float(view.straight(k * step, view.lon)[1])
-        yield f'<path class="grid" d="M0 {y:.1f}H{WIDTH:g}"/>'
-        if 24 < y < HEIGHT - 40:
-            yield _text(3, y - 3, angle(k * step, "N", "S"), "start", "faint halo")
+        yield float(view.straight(k * step, view.lon)[1]), angle(k * step, "N", "S")
 
 
 def angle(value: float, positive: str, negative: str) -> str:
@@ -294,7 +310,7 @@ def angle(value: float, positive: str, negative: str) -> str:
 
 def _scale(view: Frame) -> Iterable[str]:
     """A bar of a round number of kilometres, and which way is north."""
-    km = _round(WIDTH / 4 * view.metres / 1000)
+    km = round_number(WIDTH / 4 * view.metres / 1000)
     length = km * 1000 / view.metres
     y = HEIGHT - 12
     yield f'<path d="M12 {y - 5:g}V{y:g}H{12 + length:.1f}V{y - 5:g}" fill="none" stroke="currentColor"/>'
@@ -304,10 +320,10 @@ def _scale(view: Frame) -> Iterable[str]:
     yield _text(WIDTH - 16, 46, "N", "middle", "halo")
 
 
-def _round(value: float) -> float:
+def round_number(value: float) -> float:
     """The greatest of 1, 2 and 5 times a power of ten that is not above a value.
 
-    >>> _round(73.0), _round(0.31), _round(2.0)
+    >>> round_number(73.0), round_number(0.31), round_number(2.0)
     (50.0, 0.2, 2.0)
     """
     ten = 10.0 ** floor(np.log10(value * 1.0000001))

@@ -28,8 +28,7 @@ def speed(dives: Sequence[Assessment]) -> Panel:
     marked = []
     for flag, words in FLAGS.items():
         is_flagged = np.array([d.flag == flag for d in dives], dtype=bool) & np.isfinite(v)
-        if is_flagged.any():
-            marked.append((words, t[is_flagged], v[is_flagged]))
+        marked.append((words, t[is_flagged], v[is_flagged]))
     lines = (
         Line("through water", t, v, _evidence(dives, "speed_sigma"), joined=False),
         Line("own", t, _evidence(dives, "own_speed", "onboard_speed")),

@@ -21,6 +21,9 @@ SIZE = (5.4, 2.0)
 """Inches of a panel, of 72 units each in an SVG."""
 AREA = (0.13, 0.24, 0.85, 0.62)
 """The axes in it: left, bottom, width, height. Fixed: to find the least margins takes as long as the rest."""
+PNG_SIZE, PNG_AREA = (5.4, 2.7), (0.13, 0.19, 0.85, 0.6)
+"""The same of a panel as PNG, which has its name above."""
+_MARKS = (("^", COLOURS[1]), ("D", COLOURS[4]))
 _DASHES = ("-", "--", ":", "-.")
 _DIGITS = re.compile(r"(\d+\.\d)\d+")
 _WHOLE = re.compile(r"(?<=\d)\.0(?=[\sL\"z)])")
@@ -85,6 +88,8 @@ def library() -> Any:
     )
     import matplotlib.dates  # noqa: PLC0415
     import matplotlib.figure  # noqa: PLC0415
+    import matplotlib.patches  # noqa: PLC0415
+    import matplotlib.patheffects  # noqa: PLC0415
 
     return matplotlib
 
@@ -95,10 +100,17 @@ def svg(panel: Panel) -> str:
     return inline(as_svg(_drawn(panel)), f"{panel.name}, {panel.unit}")
 
 
-def png(panel: Panel, dots_per_inch: int = 150) -> bytes:
-    """The panel as PNG, on white, for a mail."""
+def png(panel: Panel) -> bytes:
+    """The panel as PNG, on white, with its name: for a mail."""
+    figure = _drawn(panel, PNG_SIZE, PNG_AREA, top=0.91, dots=True)
+    figure.text(PNG_AREA[0], 0.975, panel.name, va="top", fontsize=10, fontweight="bold")
+    return as_png(figure)
+
+
+def as_png(figure: Any) -> bytes:
+    """A figure of matplotlib as PNG: readable on a phone, some 50 kB."""
     out = io.BytesIO()
-    _drawn(panel).savefig(out, format="png", dpi=dots_per_inch)
+    figure.savefig(out, format="png", dpi=150, metadata={"Software": None})
     return out.getvalue()
 
 
@@ -109,17 +121,27 @@ def as_svg(figure: Any) -> str:
     return out.getvalue()[out.getvalue().index("<svg") :]
 
 
-def _drawn(panel: Panel) -> Any:
-    figure = library().figure.Figure(figsize=SIZE)
-    axis = figure.add_axes(AREA)
+def _drawn(
+    panel: Panel,
+    size: tuple[float, float] = SIZE,
+    area: tuple[float, float, float, float] = AREA,
+    *,
+    top: float = 1.0,
+    dots: bool = False,
+) -> Any:
+    """The figure of a panel, its key at the height ``top``; ``dots``: of a kind that every format has."""
+    figure = library().figure.Figure(figsize=size)
+    axis = figure.add_axes(area)
     axis.patch.set_visible(False)
     if panel.band is not None:
         t, low, high = panel.band
         axis.fill_between(_dates(t), low, high, color=COLOURS[5], alpha=0.25, linewidth=0, label="normal")
     for i, line in enumerate(panel.lines):
-        _line(axis, line, COLOURS[i % len(COLOURS)], _DASHES[i % len(_DASHES)])
-    for (words, t, v), shape in zip(panel.marked, "^sD", strict=False):
-        axis.plot(_dates(t), v, shape, color=COLOURS[1], markersize=6, label=words, zorder=4)
+        if np.isfinite(line.v).any():
+            _line(axis, line, COLOURS[i % len(COLOURS)], _DASHES[i % len(_DASHES)], dots)
+    for (words, t, v), (shape, colour) in zip(panel.marked, _MARKS, strict=False):
+        if len(t):
+            axis.plot(_dates(t), v, shape, color=colour, markersize=6, label=words, zorder=4)
     axis.set_ylabel(panel.unit)
     _bounds(axis, panel)
     dates = library().dates
@@ -129,11 +151,13 @@ def _drawn(panel: Panel) -> Any:
     axis.xaxis.get_offset_text().set_fontsize(8)
     axis.set_xlabel("time (UTC)", fontsize=8)
     if len(axis.get_legend_handles_labels()[1]) > 1:
-        figure.legend(loc="upper left", ncols=4, fontsize=8, frameon=False, borderaxespad=0.1)
+        place = {"loc": "upper left", "bbox_to_anchor": (0.0 if top == 1.0 else area[0] - 0.02, top)}
+        spaces = {"borderaxespad": 0.1, "handlelength": 1.4, "handletextpad": 0.4, "columnspacing": 1.0}
+        figure.legend(**place, **spaces, ncols=5, fontsize=8, frameon=False)
     return figure
 
 
-def _line(axis: Any, line: Line, colour: str, dashes: str) -> None:
+def _line(axis: Any, line: Line, colour: str, dashes: str, dots: bool) -> None:
     t = _dates(line.t)
     if line.sigma is not None:
         low, high = line.v - line.sigma, line.v + line.sigma
@@ -142,10 +166,12 @@ def _line(axis: Any, line: Line, colour: str, dashes: str) -> None:
         axis.plot(bars, ends, color=colour, alpha=0.4, linewidth=1.2)
     if line.joined:
         axis.plot(t, line.v, dashes, color=colour, linewidth=1.2, label=line.label)
-    else:  # a dot is a line without length with round ends: a tenth of the characters of a marker
-        dots = np.stack([t, t, t], axis=1).ravel()
+    elif dots:
+        axis.plot(t, line.v, "o", color=colour, markersize=3.5, label=line.label)
+    else:  # a dot is a line without length with round ends: in an SVG a tenth of the characters of a marker
+        doubled = np.stack([t, t, t], axis=1).ravel()
         v = np.stack([line.v, line.v, np.full(len(t), np.nan)], axis=1).ravel()
-        axis.plot(dots, v, color=colour, linewidth=3.5, solid_capstyle="round", label=line.label)
+        axis.plot(doubled, v, color=colour, linewidth=3.5, solid_capstyle="round", label=line.label)
 
 
 def _bounds(axis: Any, panel: Panel) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from html import escape
 
@@ -51,6 +52,9 @@ _HTML = _ENVIRONMENT.from_string(
 {% endmacro %}
 {{ items(do, page.do) }}
 {{ facts(page.links) }}
+{% if page.facts or page.lists or page.data or page.symbols %}
+<hr>
+{% endif %}
 {{ facts(page.facts) }}
 {% for heading, lines in page.lists %}
 {{ items(heading, lines) }}
@@ -157,6 +161,16 @@ def chat_html(brief: str) -> str:
         else:
             lines.append(f"<b>{escape(line)}</b>" if line == DO else escape(line))
     return "<br>".join(lines)
+
+
+def with_pictures(html: str, pictures: Sequence[tuple[str, str]]) -> str:
+    """The HTML of a message with pictures (address and words) above its numbers, or at its end."""
+    shown = "".join(
+        f'<p><img src="{escape(address)}" alt="{escape(words)}" style="max-width: 100%; height: auto"></p>\n'
+        for address, words in pictures
+    )
+    before = "<hr>" if "<hr>" in html else "</body>"
+    return html.replace(before, shown + before, 1)
 
 
 def with_lead(alert: Alert, line: str) -> Alert:

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import structlog
-from pebble import ProcessPool
 
 from gliderwatch.config import Config
 from gliderwatch.params import Attention
+from gliderwatch.service.drawing import DrawingProcess
 
 if TYPE_CHECKING:
     from gliderwatch.store.state_file import Store
@@ -103,7 +99,7 @@ class PageWriter:
     ) -> None:
         self._news, self._write, self._limit = news, write, limit
         self._config: Config | None = None
-        self._pool: ProcessPool | None = None
+        self._process = DrawingProcess(_NICENESS)
         self._job: Future[None] | None = None
         self._waiting: dict[str, None] = {}
         self._written: dict[str, float] = {}
@@ -143,27 +139,12 @@ class PageWriter:
 
     def stop(self) -> None:
         """End the process at once: the pages that are there are whole."""
-        if self._pool is not None:
-            self._pool.stop()  # type: ignore[no-untyped-call]
-            self._pool.join()
-            self._pool = None
+        self._process.stop()
 
     def _begin(self, job: PageJob) -> None:
-        for _ in range(2):
-            if self._pool is None:
-                self._pool = ProcessPool(
-                    max_workers=1,
-                    initializer=_prepare,
-                    initargs=(str(job.state.parent / "matplotlib"),),
-                    context=multiprocessing.get_context("spawn"),
-                )
-            try:
-                self._job = self._pool.schedule(self._write, args=(job,), timeout=self._limit)
-            except RuntimeError:  # the pool gives up for good when a process dies that has nothing to do
-                self.stop()
-            else:
-                self._job.add_done_callback(partial(self._ended, job))
-                return
+        self._job = self._process.begin(self._write, job, self._limit, job.state)
+        if self._job is not None:
+            self._job.add_done_callback(partial(self._ended, job))
 
     def _ended(self, job: PageJob, done: Future[None]) -> None:
         error = None if done.cancelled() else done.exception()
@@ -171,13 +152,3 @@ class PageWriter:
             what = str(error) or type(error).__name__
             log.warning("pages not written", glider=job.glider or "all", folder=str(job.folder), reason=what)
         self._news(PagesWritten())
-
-
-def _prepare(cache: str) -> None:
-    """What the process does first: it yields to all others, and dies at once when it is told to."""
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with suppress(OSError):  # systemd's filter may refuse it
-        os.nice(_NICENESS)
-    os.environ.setdefault("MPLCONFIGDIR", cache)
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -23,6 +23,7 @@ from gliderwatch.sea.ocean_field import Field
 from gliderwatch.service.backlog import Backlog, Job
 from gliderwatch.service.fields import FleetField, fields_of
 from gliderwatch.service.layers import wants_science
+from gliderwatch.service.mail_pictures import MailPictures
 from gliderwatch.service.page_writer import PagesWritten
 from gliderwatch.service.routing import Routing, routing_of
 from gliderwatch.slocum.caches import SensorLists, lists_folder
@@ -102,7 +103,8 @@ News = Change | Decoded | PagesWritten | signal.Signals
 
 @dataclass(frozen=True, slots=True)
 class Runtime:
-    """A configuration and what works by it. ``urls`` (with their secrets) tell whether channels changed."""
+    """A configuration and what works by it. ``urls`` (with their secrets) tell whether channels changed;
+    ``pictures`` draws those of mails."""
 
     config: Config
     news: SimpleQueue[News]
@@ -116,6 +118,7 @@ class Runtime:
     dispatcher: Dispatcher
     ocean: OceanCache
     fields: tuple[FleetField, ...]
+    pictures: MailPictures
     urls: dict[str, str] = field(repr=False)
 
     def start(self, before: Runtime | None = None) -> None:
@@ -131,6 +134,7 @@ class Runtime:
             self.decoder.close()
         if after is None or after.dispatcher is not self.dispatcher:
             self.dispatcher.stop()
+            self.pictures.stop()
 
     def cache_folders(self) -> tuple[Path, ...]:
         """Where sensor lists are now: the cache folders, then the lists that came inside of files."""
@@ -163,11 +167,16 @@ def build(
     """
     urls = {name: config.channel_url(name).get_secret_value() for name in config.channels}
     public = config.web.public_url
-    if before is not None and before.urls == urls and before.config.web.public_url == public:
-        dispatcher = before.dispatcher
+    if before is not None and before.urls == urls and _sends_as(before.config, config):
+        dispatcher, pictures = before.dispatcher, before.pictures
+        pictures.attention = config.attention
     else:
         state = Path(config.state.path)
-        channels: dict[str, Sender] = {name: Channel(name, url) for name, url in urls.items()}
+        pictures = MailPictures(state, config.attention, time.time)
+        channels: dict[str, Sender] = {
+            name: Channel(name, url, pictures if config.channels[name].pictures else None)
+            for name, url in urls.items()
+        }
         if public is not None:
             channels = links.linked(channels, str(public), state)
         dispatcher = Dispatcher(lambda: Outbox(state), channels, time.time, wake)
@@ -196,8 +205,15 @@ def build(
         dispatcher,
         ocean,
         fields_of(config),
+        pictures,
         urls,
     )
     decoder.science = wants_science(config)
     decoder.cache_folders = parts.cache_folders()
     return parts
+
+
+def _sends_as(before: Config, config: Config) -> bool:
+    """Whether messages have the same links and pictures by two configurations."""
+    with_pictures = ({n for n, c in each.channels.items() if c.pictures} for each in (before, config))
+    return before.web.public_url == config.web.public_url and next(with_pictures) == next(with_pictures)

@@ -1,0 +1,74 @@
+"""The process that draws: it loads matplotlib, can be slow, hang or die, and no alert waits for it."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable
+from concurrent.futures import Future
+from contextlib import suppress
+from pathlib import Path
+from threading import Lock
+from typing import TypeVar
+
+from pebble import ProcessPool
+
+_Job = TypeVar("_Job")
+_Made = TypeVar("_Made")
+
+
+class DrawingProcess:
+    """One process, begun when there is something to draw. For use by several threads.
+
+    `state` is the state file, beside which matplotlib keeps what it knows of fonts; `niceness` by how much it
+    yields to others; `warm` is called in the process before its first job.
+    """
+
+    def __init__(self, niceness: int, warm: Callable[[], None] | None = None) -> None:
+        self._niceness, self._warm = niceness, warm
+        self._pool: ProcessPool | None = None
+        self._lock = Lock()
+
+    def begin(
+        self, work: Callable[[_Job], _Made], job: _Job, limit: float, state: Path
+    ) -> Future[_Made] | None:
+        """Have the work done, in not more than `limit` s from when it is begun; None where that cannot be."""
+        with self._lock:
+            for _ in range(2):
+                if self._pool is None:
+                    self._pool = ProcessPool(
+                        max_workers=1,
+                        initializer=_prepare,
+                        initargs=(str(state.parent / "matplotlib"), self._niceness, self._warm),
+                        context=multiprocessing.get_context("spawn"),
+                    )
+                try:
+                    made: Future[_Made] = self._pool.schedule(work, args=(job,), timeout=limit)
+                    return made
+                except RuntimeError:  # the pool gives up for good when a process dies that has nothing to do
+                    self._end()
+        return None
+
+    def stop(self) -> None:
+        """End the process at once."""
+        with self._lock:
+            self._end()
+
+    def _end(self) -> None:
+        if self._pool is not None:
+            self._pool.stop()  # type: ignore[no-untyped-call]
+            self._pool.join()
+            self._pool = None
+
+
+def _prepare(cache: str, niceness: int, warm: Callable[[], None] | None) -> None:
+    """What the process does first: it yields to others, and dies at once when it is told to."""
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with suppress(OSError):  # systemd's filter may refuse it
+        os.nice(niceness)
+    os.environ.setdefault("MPLCONFIGDIR", cache)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if warm is not None:
+        warm()
