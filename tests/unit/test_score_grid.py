@@ -7,7 +7,7 @@ import pytest
 
 from gliderwatch.errors import ConfigError, GliderwatchError
 from gliderwatch.score import work
-from gliderwatch.score.grid import cells, check, configuration, folder, known, load_grid
+from gliderwatch.score.grid import cells, check, configuration, estimators, folder, load_grid
 from gliderwatch.score.work import to_do
 from gliderwatch.simulate.scenario import FaultKind
 
@@ -84,7 +84,7 @@ def test_no_such_grid():
 
 
 def test_an_unknown_estimator_is_refused_with_the_known_ones():
-    assert check("adaptive:franklin") in known()
+    assert check("adaptive:franklin") in estimators()
     names = "joint, adaptive, adaptive:franklin"
     with pytest.raises(GliderwatchError, match=f"no estimator adaptve; known are: {names}"):
         check("adaptve")

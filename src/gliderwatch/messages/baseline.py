@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from math import degrees
 from typing import Literal
 
-from gliderwatch.messages.formatting import known
+from gliderwatch.messages.formatting import finite
 
 
 @dataclass(frozen=True, slots=True)
 class Wording:
-    """How a number is told.
+    """How a number is written.
 
     ``words`` hold the value; ``per`` is what a unit of ours is worth in theirs, ``digits`` behind the point.
     ``less`` and ``more`` say what a size below or above its range means; only the ``telling`` of them points
@@ -68,18 +68,19 @@ WORDINGS = (
 
 def usual(evidence: Mapping[str, float]) -> list[BaselineRemark]:
     """All numbers of a dive of which the evidence says what is usual."""
-    return [told for wording in WORDINGS if (told := _baseline_remark(evidence, wording)) is not None]
+    remarks = (_baseline_remark(evidence, wording) for wording in WORDINGS)
+    return [remark for remark in remarks if remark is not None]
 
 
 def has_usual(evidence: Mapping[str, float], *names: str) -> bool:
     """Whether what is usual is known for all of some numbers."""
-    return all(known(evidence.get(f"{name}_usual")) is not None for name in names)
+    return all(finite(evidence.get(f"{name}_usual")) is not None for name in names)
 
 
 def _baseline_remark(evidence: Mapping[str, float], wording: Wording) -> BaselineRemark | None:
     """A number in words; None where it or its range is not known."""
     names = (wording.name, *(f"{wording.name}_{end}" for end in ("low", "usual", "high")))
-    found = [known(evidence.get(name)) for name in names]
+    found = [finite(evidence.get(name)) for name in names]
     numbers = [wording.per * each for each in found if each is not None]
     if len(numbers) < len(names):
         return None

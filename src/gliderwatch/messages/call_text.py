@@ -16,7 +16,7 @@ from gliderwatch.incidents.notices import (
     StillAborted,
 )
 from gliderwatch.messages.formatting import clean, duration, place, short_place, utc
-from gliderwatch.messages.lines import Pairs, map_of, name_of, take_on_thread
+from gliderwatch.messages.phrases import Pairs, map_of, name_of, take_on_thread
 from gliderwatch.messages.template import Page, Text, titled
 from gliderwatch.model import Call, Happening
 

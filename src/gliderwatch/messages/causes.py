@@ -9,7 +9,7 @@ from gliderwatch.estimation.modes import MODES
 from gliderwatch.estimation.modes import Cause as Explanation
 from gliderwatch.estimation.verdict import FASTER, NEW_FASTER, Blame
 from gliderwatch.messages.baseline import BaselineRemark, usual
-from gliderwatch.messages.formatting import angle, known, speed
+from gliderwatch.messages.formatting import angle, finite, speed
 from gliderwatch.model import Assessment, Kind
 
 ROLL_OF_ANY = 15.0  # degrees: unusual on any glider, for one whose usual roll is not known
@@ -154,7 +154,7 @@ def likeliest(kind: Kind, a: Assessment) -> Likely:
     """What a dive says is the likeliest cause of an incident of a kind."""
     if kind is Kind.FALSE_ALARM:
         return _of_disagreement(a)
-    value = known(a.speed)
+    value = finite(a.speed)
     if value is not None and value > a.speed_max:
         return Likely(FAST, "")
     off = {remark.name: remark for remark in usual(a.evidence) if remark.side != "none"}
@@ -178,8 +178,8 @@ def is_named(reason: str) -> bool:
 
 
 def _of_disagreement(a: Assessment) -> Likely:
-    across = known(a.evidence.get("across_misfit"))
-    side, sigma = known(a.evidence.get("side")), known(a.evidence.get("side_sigma"))
+    across = finite(a.evidence.get("across_misfit"))
+    side, sigma = finite(a.evidence.get("side")), finite(a.evidence.get("side_sigma"))
     cause = _SURE_REASONS.get(a.reason)
     if cause is None and side is not None and sigma is not None and abs(side) > 3 * sigma:
         return Likely(COMPASS, f"it makes {100 * abs(side):.0f} % of its speed across its heading")
@@ -203,7 +203,7 @@ def _is_slower(remark: BaselineRemark) -> bool:
 def _of_roll(a: Assessment, off: dict[str, BaselineRemark]) -> Likely | None:
     if "roll_mean" in off:
         return Likely(WING, off["roll_mean"].text)
-    roll = known(a.evidence.get("roll_mean"))
+    roll = finite(a.evidence.get("roll_mean"))
     if roll is None or abs(degrees(roll)) <= ROLL_OF_ANY or "roll_mean_usual" in a.evidence:
         return None
     return Likely(WING, f"roll {angle(roll)}")
@@ -216,14 +216,14 @@ def _of_commands(off: dict[str, BaselineRemark]) -> Likely | None:
 
 def _of_the_way(a: Assessment) -> Likely | None:
     """Slower through the water than the glider believes: what it believes knows nothing of a lost wing."""
-    believed = known(a.evidence.get("own_speed", a.evidence.get("onboard_speed")))
-    value = known(a.speed)
+    believed = finite(a.evidence.get("own_speed", a.evidence.get("onboard_speed")))
+    value = finite(a.speed)
     if believed is None or value is None or believed - value <= HIDDEN * believed or believed < a.speed_min:
         return None
     return Likely(WING, f"it believes to make {speed(believed)}")
 
 
 def _of_size(a: Assessment) -> Likely:
-    value = known(a.speed)
+    value = finite(a.speed)
     is_small = value is not None and value >= a.speed_min
     return Likely(GROWTH if is_small else UNCLEAR, "small, over several dives" if is_small else "")

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from gliderwatch.messages.baseline import has_usual, usual
 from gliderwatch.messages.causes import ROLL_OF_ANY, WING, Cause
-from gliderwatch.messages.formatting import angle, clean, known, speed
+from gliderwatch.messages.formatting import angle, clean, finite, speed
 from gliderwatch.model import Assessment, Kind
 
 # Bounds above (or below) which a number is worth a line; they change no flag.
@@ -38,12 +38,12 @@ class Remark(NamedTuple):
 
 def number(assessment: Assessment, name: str) -> float | None:
     """A number of the evidence; None where it is missing or not a number."""
-    return known(assessment.evidence.get(name))
+    return finite(assessment.evidence.get(name))
 
 
 def out_of_range(assessment: Assessment, value: float | None) -> bool:
     """Whether a speed (m/s) is known and outside the glider's normal range."""
-    value = known(value)
+    value = finite(value)
     return value is not None and not assessment.speed_min <= value <= assessment.speed_max
 
 
@@ -61,7 +61,7 @@ def normal_range(a: Assessment) -> str:
 def difference(assessment: Assessment) -> float | None:
     """Length of the estimated current less the glider's (m/s), None where one of them is missing."""
     a = assessment
-    u, v, ru, rv = (known(x) for x in (a.flow_u, a.flow_v, a.reference_u, a.reference_v))
+    u, v, ru, rv = (finite(x) for x in (a.flow_u, a.flow_v, a.reference_u, a.reference_v))
     return None if u is None or v is None or ru is None or rv is None else hypot(u - ru, v - rv)
 
 
@@ -84,7 +84,7 @@ def certainty(kind: Kind, a: Assessment, dives: int) -> str:
 
 
 def _of_speed(a: Assessment) -> float | None:
-    value, sigma, middle = known(a.speed), number(a, "speed_sigma"), number(a, "usual_speed")
+    value, sigma, middle = finite(a.speed), number(a, "speed_sigma"), number(a, "usual_speed")
     if value is None or not sigma:
         return None
     if value > a.speed_max:
@@ -146,7 +146,7 @@ def _speeds(a: Assessment, cause: Cause) -> list[Remark]:
             # what a glider reports of itself does not know of a lost wing
             is_for = is_out != (cause is WING and name == "onboard_speed")
             found.append(Remark(is_for, text, STRONG if name == "along_speed" else 1.0))
-    before, now = number(a, "speed_before"), known(a.speed)
+    before, now = number(a, "speed_before"), finite(a.speed)
     if before is not None and out_of_range(a, now) and out_of_range(a, before):
         found.append(Remark(True, f"the dive before was out of range too: {speed(before)}"))
     return found
@@ -170,7 +170,7 @@ def _of_any(a: Assessment, cause: Cause) -> list[Remark]:
 def _disagreement(a: Assessment) -> list[Remark]:
     """For and against that a measurement is wrong."""
     found = []
-    across, apart, p_e = number(a, "across_misfit"), difference(a), known(a.p_e)
+    across, apart, p_e = number(a, "across_misfit"), difference(a), finite(a.p_e)
     if across is not None and abs(across) > misfit_limit(a):
         text = (
             f"across the heading the track misses by {speed(abs(across))}, which a slow glider cannot cause"
@@ -203,7 +203,7 @@ def misfit_limit(a: Assessment) -> float:
 
 def data_quality(a: Assessment) -> tuple[str, ...]:
     """Remarks on the data of a dive, the weightiest first."""
-    if known(a.reference_u) is None or known(a.reference_v) is None:
+    if finite(a.reference_u) is None or finite(a.reference_v) is None:
         current: tuple[str, ...] = ("the glider reckons no current for this dive",)
     else:
         current = (
@@ -229,7 +229,7 @@ def data_quality(a: Assessment) -> tuple[str, ...]:
 
 def symbols(a: Assessment) -> tuple[str, ...]:
     """What who knows the papers asks for (`docs/nomenclature.md`)."""
-    apart, p_e, clle, excitation = difference(a), known(a.p_e), known(a.clle_max), known(a.excitation)
+    apart, p_e, clle, excitation = difference(a), finite(a.p_e), finite(a.clle_max), finite(a.excitation)
     slip, side = number(a, "slip"), number(a, "side")
     alike = "near 0: speed and flow look alike"
     return (

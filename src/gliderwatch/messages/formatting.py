@@ -25,7 +25,7 @@ def clean(text: str, limit: int = 200) -> str:
     return line if len(line) <= limit else line[: limit - 3] + "..."
 
 
-def known(value: float | None) -> float | None:
+def finite(value: float | None) -> float | None:
     """The value, or None where it is missing or not a number."""
     return value if value is not None and isfinite(value) else None
 
@@ -56,7 +56,7 @@ def speed(value: float | None) -> str:
     >>> speed(-0.001), speed(None)
     ('0.00 m/s', 'unknown')
     """
-    value = known(value)
+    value = finite(value)
     return UNKNOWN if value is None else f"{round(value, 2) + 0.0:.2f} m/s"
 
 
@@ -66,7 +66,7 @@ def flow(u: float | None, v: float | None) -> str:
     >>> flow(0.1, 0.1), flow(-0.001, 0.3)
     ('0.14 m/s towards 045° true', '0.30 m/s towards 000° true')
     """
-    u, v = known(u), known(v)
+    u, v = finite(u), finite(v)
     if u is None or v is None:
         return UNKNOWN
     return f"{hypot(u, v):.2f} m/s towards {round(degrees(atan2(u, v))) % 360:03d}° true"
@@ -80,7 +80,7 @@ def place(lat: float | None, lon: float | None) -> str:
     >>> place(None, 1.0)
     'unknown'
     """
-    lat, lon = known(lat), known(lon)
+    lat, lon = finite(lat), finite(lon)
     if lat is None or lon is None:
         return UNKNOWN
     north, east = _minutes(lat, "N", "S", 2), _minutes(lon, "E", "W", 3)
@@ -98,14 +98,14 @@ def short_place(lat: float | None, lon: float | None) -> str:
 
 def _minutes(angle: float, positive: str, negative: str, width: int) -> str:
     # thousandths of a minute as an integer, so that 59.9996' becomes the next degree and not 60.000'
-    whole, rest = divmod(round(abs(angle) * 60_000), 60_000)
-    return f"{whole:0{width}d}° {rest / 1000:06.3f}' {positive if angle >= 0 else negative}"
+    full, rest = divmod(round(abs(angle) * 60_000), 60_000)
+    return f"{full:0{width}d}° {rest / 1000:06.3f}' {positive if angle >= 0 else negative}"
 
 
 def map_link(lat: float | None, lon: float | None) -> str:
     """A map with a marker at the position, short enough for one line of a mail or terminal; empty where it is
     unknown."""
-    lat, lon = known(lat), known(lon)
+    lat, lon = finite(lat), finite(lon)
     if lat is None or lon is None:
         return ""
     return f"https://www.openstreetmap.org/?mlat={lat:.5f}&mlon={lon:.5f}&zoom=9"

@@ -15,7 +15,7 @@ from gliderwatch.health.rule import Finding
 from gliderwatch.health.rules import RULES
 from gliderwatch.incidents.notices import HealthFound, HealthIncident, HealthOver, HealthReminder
 from gliderwatch.messages.formatting import clean, duration, short_place, utc
-from gliderwatch.messages.lines import map_of, name_of, take_on_thread
+from gliderwatch.messages.phrases import map_of, name_of, take_on_thread
 from gliderwatch.messages.template import Page, Text, sentence, titled
 from gliderwatch.model import Fix
 

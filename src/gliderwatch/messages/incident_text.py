@@ -31,8 +31,8 @@ from gliderwatch.messages.evidence import (
     symbols,
     weigh,
 )
-from gliderwatch.messages.formatting import INCIDENTS, clean, duration, known, place, utc
-from gliderwatch.messages.lines import (
+from gliderwatch.messages.formatting import INCIDENTS, clean, duration, finite, place, utc
+from gliderwatch.messages.phrases import (
     dive_numbers,
     exact_speed,
     map_of,
@@ -93,7 +93,7 @@ def _course(incident: Incident, latest: Assessment, now: Situation) -> str:
     last = f"; last speeds {trend(now)}" if trend(now) else ""
     if incident.kind is Kind.FALSE_ALARM or latest.flag is None:
         return f"Latest dive: {flag_words(latest, short=True)}{last}."
-    value, worst = known(latest.speed), known(incident.worst.speed)
+    value, worst = finite(latest.speed), finite(incident.worst.speed)
     if value is None or worst is None:
         how = "Not known whether better or worse"
     elif not out_of_range(latest, value):
@@ -250,7 +250,7 @@ def _word(incident: Incident, dive: Assessment) -> str:
     """What is wrong, in capitals."""
     if incident.kind is Kind.FALSE_ALARM:
         return "MEASUREMENTS DISAGREE"
-    value = known(dive.speed)
+    value = finite(dive.speed)
     return "FAST" if value is not None and value > dive.speed_max else "SLOW"
 
 
@@ -259,7 +259,7 @@ def _title(glider: str, incident: Incident, dive: Assessment, likely: Likely) ->
     cause = f": {short}" if short else ""
     if incident.kind is Kind.FALSE_ALARM:
         return titled(glider, word, cause)
-    if known(dive.speed) is None:
+    if finite(dive.speed) is None:
         return titled(glider, f"{word}, speed not known", f" ({normal_range(dive)})", cause)
     return titled(glider, f"{word} {exact_speed(dive)}", f" ({normal_range(dive)})", cause)
 
@@ -279,7 +279,7 @@ def _headline(incident: Incident, a: Assessment, likely: Likely) -> str:
 
 def _share(a: Assessment) -> str:
     """How far the speed is from the usual one."""
-    value, middle = known(a.speed), number(a, "usual_speed")
+    value, middle = finite(a.speed), number(a, "usual_speed")
     if value is None or not middle:
         return ""
     part = abs(1 - max(value, 0.0) / middle)

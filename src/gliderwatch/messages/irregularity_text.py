@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gliderwatch.incidents.notices import Irregularity, OldDates, TwoGliders
 from gliderwatch.messages.formatting import duration, place, utc
-from gliderwatch.messages.lines import name_of
+from gliderwatch.messages.phrases import name_of
 from gliderwatch.messages.template import Page, Text, lead_and_actions, titled
 from gliderwatch.navigation.clock import DAY, ROLLOVER, ClockStep, span
 

@@ -9,7 +9,7 @@ from gliderwatch.fleet.cross_check import Fault, Hypothesis
 from gliderwatch.incidents.notices import DiffersFromNeighbours
 from gliderwatch.messages.evidence import CERTAIN
 from gliderwatch.messages.formatting import clean, utc
-from gliderwatch.messages.lines import name_of, silence
+from gliderwatch.messages.phrases import mute_link, name_of
 from gliderwatch.messages.template import Page, Text, titled
 
 _CHECKS = {
@@ -53,7 +53,7 @@ def differs(glider: str, content: DiffersFromNeighbours) -> Text:
             ),
         ),
         do=_SHARED if shared else _CHECKS[found.fault],
-        links=silence(glider),
+        links=mute_link(glider),
         symbols=(f"twice the log likelihood ratio {found.ratio:.0f}",),
     )
     short = "LOSES SPEED" if found.fault is Fault.LOSS else "COMPASS OFF"

@@ -16,7 +16,7 @@ from gliderwatch.messages.formatting import (
     short_place,
     utc,
 )
-from gliderwatch.messages.lines import map_of, name_of, silence, where
+from gliderwatch.messages.phrases import map_of, mute_link, name_of, where
 from gliderwatch.messages.template import Page, Text, titled
 from gliderwatch.model import Assessment
 
@@ -39,7 +39,7 @@ def overdue(glider: str, content: Overdue) -> Text:
         _numbers(a),
         tuple((heading, lines) for heading, lines in lists if lines),
         _todo(a),
-        (*(() if a.area is None else map_of(a.area.lat, a.area.lon)), *silence(glider)),
+        (*(() if a.area is None else map_of(a.area.lat, a.area.lon)), *mute_link(glider)),
     )
     more = f", all {a.fleet.others + 1} silent: dockserver?" if a.fleet.is_silent else ""
     return titled(glider, f"{still.upper()}OVERDUE {late}", more), page

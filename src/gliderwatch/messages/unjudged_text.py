@@ -6,7 +6,7 @@ from collections import defaultdict
 
 from gliderwatch.incidents.notices import Blind, JudgedAgain, Unjudged
 from gliderwatch.messages.formatting import clean, duration, utc
-from gliderwatch.messages.lines import name_of, next_call, silence, where
+from gliderwatch.messages.phrases import mute_link, name_of, next_call, where
 from gliderwatch.messages.template import Page, Text, sentence, titled
 from gliderwatch.model import Hindrance, Unusable
 
@@ -70,7 +70,7 @@ def blind(glider: str, content: Blind) -> Text:
         ),
         ((("Other reasons", others),) if others else ()),
         tuple(dict.fromkeys(_cure(item) for item, _ in reasons))[:3],
-        silence(glider),
+        mute_link(glider),
     )
     short = _SHORT.get(main.cause, "")
     still = "" if content.first else "STILL "

@@ -29,21 +29,23 @@ class Report:
     final: bool
 
 
-Known = tuple[tuple[float, float] | None, tuple[float, float] | None]
+LastReported = tuple[tuple[float, float] | None, tuple[float, float] | None]
 """The last values reported as current and as corrected current, as the glider gave them: relative to
 magnetic north, so that one repeated under a new declination is still the same. None: none yet."""
 
 
-def new_reports(segment: Segment, declination: float, known: Known) -> tuple[list[Report], Known]:
+def new_reports(
+    segment: Segment, declination: float, before: LastReported
+) -> tuple[list[Report], LastReported]:
     """The currents in a segment that differ from those reported before, in order of time.
 
     `declination` (rad) turns them to true north. A current of exactly zero is one not computed yet.
     """
     name = "current" if len(segment.get("current_x")) else "current_initial"
-    provisional, known_provisional = _changes(segment, name, False, declination, known[0])
-    final, known_final = _changes(segment, "current_final", True, declination, known[1])
+    provisional, last_provisional = _changes(segment, name, False, declination, before[0])
+    final, last_final = _changes(segment, "current_final", True, declination, before[1])
     # of one moment the corrected one comes last and so wins
-    return sorted(provisional + final, key=lambda r: (r.t, r.final)), (known_provisional, known_final)
+    return sorted(provisional + final, key=lambda r: (r.t, r.final)), (last_provisional, last_final)
 
 
 def _changes(

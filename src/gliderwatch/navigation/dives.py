@@ -27,7 +27,7 @@ from gliderwatch.navigation.constants import (
     SUSPECT_DISTANCE,
     TURNED_MUCH,
 )
-from gliderwatch.navigation.dac import Known, Report, new_reports, pair, updated
+from gliderwatch.navigation.dac import LastReported, Report, new_reports, pair, updated
 from gliderwatch.navigation.features import flight_features, track_features
 from gliderwatch.navigation.fixes import distance, new_fixes, surface_intervals, zeroed
 from gliderwatch.navigation.flight import (
@@ -110,12 +110,12 @@ def segment_notes(segment: Segment, declination: float | None, from_model: bool)
     return tuple(notes)
 
 
-def corrected_notes(ahead: float, surface: float) -> tuple[str, ...]:
-    """Notes on a clock that was set ``ahead`` (s), and on a depth sensor that shows ``surface`` (m) at the
-    surface; 0: neither."""
+def corrected_notes(step: float, surface: float) -> tuple[str, ...]:
+    """Notes on a clock that was set forward by a ``step`` (s), and on a depth sensor that shows ``surface``
+    (m) at the surface; 0: neither."""
     notes = []
-    if ahead:
-        notes.append(f"the glider's clock was set forward by {span(ahead)}, or it stayed at the surface")
+    if step:
+        notes.append(f"the glider's clock was set forward by {span(step)}, or it stayed at the surface")
     if surface:
         notes.append(f"depth is {surface:.1f} m at the surface: taken off (the pressure was not zeroed)")
     return tuple(notes)
@@ -146,7 +146,7 @@ def flight_notes(flight: Flight, features: DiveFeatures) -> tuple[str, ...]:
 #
 # A dive lies between two fixes. The fix that ends it, and the current that the glider computed for it,
 # often come only with the next segment: so the state carries on the samples since the last fix,
-# and a dive is told again when more of it is known.
+# and a dive is returned again when more of it is known.
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,13 +154,13 @@ class Navigation:
     """State of the navigation of one glider after a segment.
 
     ``fix`` is the last good one and ``carry`` the samples after it; ``declination`` (rad) the last known,
-    ``declination_t`` when the glider told it (s; None: a model's); ``last_t`` the end of the
+    ``declination_t`` when the glider reported it (s; None: a model's); ``last_t`` the end of the
     latest segment (s); ``holes`` the times (start, end) since the fix of which no segment has come;
     ``calls`` those between two segments that follow each other, in which none is missing, and ``last_name``
     the name of the latest segment if it holds a whole flight and ends at the surface (else empty: it may
     break off); ``holder`` the segment that holds the flight since the fix; ``known`` the currents reported
-    last and ``reports`` those whose dive is not told yet; ``dive`` the last whole dive, ``untold`` the
-    surfacing (s) of a later one that is not told; ``notes`` on the data since the fix;
+    last and ``reports`` those whose dive is not returned yet; ``dive`` the last whole dive, ``untold`` the
+    surfacing (s) of a later one that is not returned; ``notes`` on the data since the fix;
     ``latest`` the name of the latest segment; ``surface_depth`` what the depth sensor shows at the surface
     (m; 0: near enough).
     """
@@ -174,7 +174,7 @@ class Navigation:
     calls: tuple[tuple[float, float], ...] = ()
     last_name: str = ""
     holder: str = ""
-    known: Known = (None, None)
+    known: LastReported = (None, None)
     reports: tuple[Report, ...] = ()
     dive: Dive | None = None
     untold: float | None = None
@@ -186,19 +186,19 @@ class Navigation:
 def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]:
     """The state after one more segment, and the dives that are new or better known by it, in order of time.
 
-    The first may be the last dive of before, told again: a dive replaces the one of the same ``t_dive``.
+    The first may be the last dive of before, returned again: a dive replaces the one of the same ``t_dive``.
     A dive that cannot be used for estimation comes with its reason, also one that has not ended.
     """
     state = _with_declination(state, segment)
     fresh = prepare(segment, state.declination or 0.0)
-    state, ahead = _with_clock(state, segment, fresh)
+    state, step = _with_clock(state, segment, fresh)
     fresh, surface = zeroed(fresh, state.fix, state.surface_depth)
     state = replace(state, surface_depth=surface)
     samples = concatenated(state.carry, fresh)
-    reports, known = new_reports(segment, state.declination or 0.0, state.known)
+    reports, last_reported = new_reports(segment, state.declination or 0.0, state.known)
     quality = segment_notes(segment, state.declination, from_model=state.declination_t is None)
-    quality += corrected_notes(ahead, surface)
-    state = replace(_placed(state, segment, fresh, quality), known=known)
+    quality += corrected_notes(step, surface)
+    state = replace(_placed(state, segment, fresh, quality), known=last_reported)
 
     before = state.dive
     fixes = new_fixes(samples, state.fix)
@@ -301,7 +301,7 @@ def _with_clock(state: Navigation, segment: Segment, fresh: Samples) -> tuple[Na
 
 
 def _withdraw_old_fix(state: Navigation, fixes: list[Fix]) -> tuple[Navigation, list[Dive]]:
-    """The dives told before, the last one withdrawn if the next fix shows that an old fix ended it."""
+    """The dives returned before, the last one withdrawn if the next fix shows that an old fix ended it."""
     if state.dive is None:
         return state, []
     if fixes and state.fix is not None and state.dive.end == state.fix:
@@ -354,11 +354,11 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
     else:
         track = build_track(samples, flight, start, end)
         gap = heading_gap(samples, flight)
-        known = track_features(samples, flight, track)
-        unsure = unsteered(samples, flight)[0] is not None and not known.heading_reckoned
+        features = track_features(samples, flight, track)
+        unsure = unsteered(samples, flight)[0] is not None and not features.heading_reckoned
         features = replace(
-            known,
-            heading_assumed=known.heading_assumed or unsure,
+            features,
+            heading_assumed=features.heading_assumed or unsure,
             heading_gap=gap if gap > HEADING_GAP else None,
             unobserved=missing,
         )
@@ -382,9 +382,9 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
 def _with_currents(
     finished: list[Dive], untold: list[float], under_way: Flight | None, reports: list[Report]
 ) -> tuple[list[Dive], list[Report]]:
-    """The dives with the currents published for them, and the reports of a dive that is not told yet.
+    """The dives with the currents published for them, and the reports of a dive that is not returned yet.
 
-    `untold` are surfacings (s) of dives that are never told: their currents are nobody's. One that was
+    `untold` are surfacings (s) of dives that are never returned: their currents are nobody's. One that was
     published well within a flight is that of a part of it, up to a surfacing without a fix: so is then the
     one at its end, and neither is the current between the two fixes.
     """
@@ -401,7 +401,7 @@ def _with_currents(
             if part < 0:
                 waiting.append(report)
             else:
-                out[part] = _in_parts(out[part])
+                out[part] = _with_partial_currents(out[part])
             continue
         i = ends[k][1] if 0 <= k < len(ends) else None
         if k == len(ends):
@@ -415,7 +415,7 @@ def _with_currents(
     return out, waiting
 
 
-def _in_parts(dive: Dive) -> Dive:
+def _with_partial_currents(dive: Dive) -> Dive:
     """A dive in which the glider surfaced without a fix."""
     if dive.features.surfacing_unseen:
         return dive

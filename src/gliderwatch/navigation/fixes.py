@@ -120,20 +120,20 @@ SHALLOW = 0.25
 """Quantile of the depths at the surface that is taken: some are of the first metres of a dive."""
 
 
-def zeroed(fresh: Samples, last: Fix | None, known: float) -> tuple[Samples, float]:
+def zeroed(fresh: Samples, last: Fix | None, before: float) -> tuple[Samples, float]:
     """The samples of a segment with depths from the surface, and what its sensor shows at the surface (m).
 
-    That is seen at the fixes after the ``last`` of before; without them it is as ``known``. 0: near enough.
+    That is seen at the fixes after the ``last`` of before; without them it is as ``before``. 0: near enough.
     """
     depth = get(fresh, "depth")
     if not len(depth):
-        return fresh, known
+        return fresh, before
     shown = _at_surface(depth, [fix.t for fix in new_fixes(fresh, last)])
     if shown is not None:
-        known = shown if abs(shown) > LEAST else 0.0
-    if not known:
+        before = shown if abs(shown) > LEAST else 0.0
+    if not before:
         return fresh, 0.0
-    return MappingProxyType({**fresh, "depth": Series(depth.t, readonly(depth.v - known))}), known
+    return MappingProxyType({**fresh, "depth": Series(depth.t, readonly(depth.v - before))}), before
 
 
 def _at_surface(depth: Series, fixes: list[float]) -> float | None:

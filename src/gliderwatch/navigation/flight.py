@@ -49,7 +49,7 @@ def downsample(quantities: Mapping[str, Series]) -> dict[str, Series]:
     `SCIENCE_SPACING`, averaged.
 
     Angles of compass are averaged as vectors; of what jumps the first in each bin is kept, fixes
-    and currents stay whole. Doing it twice changes nothing.
+    and currents keep all rows. Doing it twice changes nothing.
     """
     out = {}
     for name, series in quantities.items():
@@ -180,7 +180,7 @@ UNDERWATER = 1
 
 @dataclass(frozen=True, slots=True)
 class Flight:
-    """The first and last moment under water (s) seen in the samples, and what told it."""
+    """The first and last moment under water (s) seen in the samples, and what showed it."""
 
     start: float
     end: float
@@ -229,8 +229,8 @@ def lengthened(
 
     Some tell of every third yo only. Where for longer than `DENIES_DIVE` after what was seen there is no
     depth (pitch, where depth is not sent) and no position, the flight goes on to the first of them: at the
-    surface a glider tells its position at once. Where a whole file is missing (``holes``, s) that cannot be
-    said.
+    surface a glider reports its position at once. Where a whole file is missing (``holes``, s) that is not
+    certain.
     """
     sensor = "depth" if len(get(samples, "depth").between(flight.start, before)) else "pitch"
     times = np.concatenate([get(samples, sensor).t, get(samples, "fix_lat").t])

@@ -73,8 +73,8 @@ def _speed_score(estimator: str, sea: str, is_faulty: bool, gliders: Sequence[Re
 
         return bootstrap(gliders, of)
 
-    known = np.isfinite(every[:, 2]) if len(every) else np.zeros(0, dtype=bool)
-    inside = np.abs(every[known, 0]) <= 1.96 * every[known, 2]
+    has_sigma = np.isfinite(every[:, 2]) if len(every) else np.zeros(0, dtype=bool)
+    inside = np.abs(every[has_sigma, 0]) <= 1.96 * every[has_sigma, 2]
     return SpeedScore(
         estimator,
         sea,
@@ -82,18 +82,18 @@ def _speed_score(estimator: str, sea: str, is_faulty: bool, gliders: Sequence[Re
         len(every),
         rms(0),
         rms(1),
-        float(inside.mean()) if known.any() else None,
+        float(inside.mean()) if has_sigma.any() else None,
     )
 
 
 # ----------------------------------------
-# How well the next surfacing was told: time, place and their 95 %.
+# How well the next surfacing was forecast: time, place and their 95 %.
 
 
 @dataclass(frozen=True, slots=True)
 class NextScore:
     """Forecasts of one estimator in one sea: mean errors of place (m) beside ``persistence``, and of time
-    (s); parts of places and times within what was said to hold 95 %."""
+    (s); parts of places and times within the bounds that hold 95 %."""
 
     estimator: str
     sea: str
@@ -114,15 +114,15 @@ class _Fix:
 
 
 def results(
-    said: Iterable[NextSurfacing], dives: Sequence[Assessment], until: float = float("inf")
+    forecasts: Iterable[NextSurfacing], dives: Sequence[Assessment], until: float = float("inf")
 ) -> tuple[NextResult, ...]:
-    """The forecasts as first ``said`` after each surfacing, beside the fix after the next dive.
+    """The forecasts as first made (``forecasts``) after each surfacing, beside the fix after the next dive.
 
     ``dives`` are all of a glider in order of time. Left out is what files do not tell, and what came after
     ``until`` (s).
     """
     first: dict[float, NextSurfacing] = {}
-    for e in said:
+    for e in forecasts:
         first.setdefault(e.after, e)
     fixes = [_fix(dive) for dive in dives]
     out = []

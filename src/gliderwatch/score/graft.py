@@ -57,8 +57,8 @@ def navigate(segments: Iterable[Segment]) -> list[Dive]:
     """The dives of a mission whose segments come in the order of time."""
     state, dives = Navigation(), dict[float, Dive]()
     for segment in segments:
-        state, told = extend(state, segment)
-        dives |= {dive.t_dive: dive for dive in told}
+        state, updated = extend(state, segment)
+        dives |= {dive.t_dive: dive for dive in updated}
     return [dives[t] for t in sorted(dives) if dives[t].end is not None]
 
 

@@ -32,14 +32,14 @@ ALGORITHMS = ("joint", "adaptive")
 """The values of `estimator:`, the default first."""
 
 
-def known() -> list[str]:
+def estimators() -> list[str]:
     """All names: those of the algorithms with default settings, and `adaptive:PRESET`."""
     return [*ALGORITHMS, *(f"adaptive:{name}" for name in read(presets_path()).data)]
 
 
 def check(name: str) -> str:
     """The name itself. Raises GliderwatchError where there is no such estimator."""
-    names = known()
+    names = estimators()
     if name not in names:
         raise GliderwatchError(f"there is no estimator {name}; known are: {', '.join(names)}")
     return name
@@ -254,7 +254,7 @@ def _label(name: str, without: str) -> str:
 
 
 def _sea(name: str) -> Callable[[int], Scenario]:
-    """The mission in a sea by its chance: always one scenario, or one anew of a kind of sea. Raises
+    """The mission in a sea by its chance: always one scenario, or a new one of a kind of sea. Raises
     ConfigError where there is neither."""
     if name in SEAS:
         return partial(sea_mission, name)

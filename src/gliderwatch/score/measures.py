@@ -20,13 +20,13 @@ HEALTHY = "none"
 class OpenedIncident:
     """A message that opened an incident.
 
-    ``flag`` 1 or 2; ``t_surface`` the surfacing that opened it and ``told`` when the file that let it be
-    said was on shore (both s).
+    ``flag`` 1 or 2; ``t_surface`` the surfacing that opened it and ``reported_at`` when the file
+    that showed it was on shore (both s).
     """
 
     flag: int
     t_surface: float
-    told: float
+    reported_at: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class DiveResult:
 
 @dataclass(frozen=True, slots=True)
 class NextResult:
-    """A forecast of the next surfacing, as first said, beside what came.
+    """A forecast of the next surfacing, as first made, beside what came.
 
     ``late`` (s) by how much it came later, ``miss`` (m) between the places; ``persistence`` (m) the same for
     the way of the dive before gone once more; whether place and time were within what was to hold 95 %.
@@ -88,7 +88,7 @@ class Record:
     high: float
     surfacings: tuple[float, ...]
     dives: tuple[DiveResult, ...]
-    told: tuple[OpenedIncident, ...]
+    openings: tuple[OpenedIncident, ...]
     seconds: float = 0.0
     next: tuple[NextResult, ...] = ()
 
@@ -141,7 +141,7 @@ class FaultScore:
     """One estimator on one fault of one size, in one sea or (``sea`` empty) in all.
 
     ``expected`` is the flag that tells the truth (None: the glider is healthy), ``detected`` the part of
-    gliders of which it was told, ``chance`` the part that false messages alone would have made. Delays
+    gliders of which it was reported, ``chance`` the part that false messages alone would have made. Delays
     are quantiles over all gliders: infinite where too few were detected. ``flag_1``, ``flag_2`` are the
     parts of gliders that got such a message, ``first`` those whose first message was of the flag
     expected; ``unexpected`` counts messages of another flag than that a glider-month.
@@ -190,18 +190,18 @@ class FalseScore:
 
 def after_onset(record: Record) -> list[OpenedIncident]:
     """The messages about surfacings after the onset."""
-    return [t for t in record.told if record.onset is not None and t.t_surface > record.onset]
+    return [t for t in record.openings if record.onset is not None and t.t_surface > record.onset]
 
 
 def detection(record: Record) -> Detection | None:
-    """When a fault was told with the right flag, None if never."""
+    """When a fault was reported with the right flag, None if never."""
     expected = EXPECTED.get(record.fault)
-    times = [t.told for t in after_onset(record) if t.flag == expected]
+    times = [t.reported_at for t in after_onset(record) if t.flag == expected]
     if not times or record.onset is None:
         return None
-    told = min(times)
-    count = sum(record.onset < t <= told for t in record.surfacings)
-    return Detection(count, (told - record.onset) / 3600)
+    first = min(times)
+    count = sum(record.onset < t <= first for t in record.surfacings)
+    return Detection(count, (first - record.onset) / 3600)
 
 
 def healthy_time(record: Record) -> float:
@@ -209,9 +209,9 @@ def healthy_time(record: Record) -> float:
     return (record.onset if record.onset is not None else record.end) - record.start
 
 
-def false_told(record: Record, flag: int) -> int:
+def false_openings(record: Record, flag: int) -> int:
     """Messages of a flag on a healthy glider or before the onset."""
-    return sum(t.flag == flag and _is_healthy(record, t.t_surface) for t in record.told)
+    return sum(t.flag == flag and _is_healthy(record, t.t_surface) for t in record.openings)
 
 
 def _is_healthy(record: Record, t: float) -> bool:
@@ -313,7 +313,7 @@ def _fault_score(
 
 
 def _first_flag(record: Record) -> int | None:
-    return next((t.flag for t in sorted(after_onset(record), key=lambda t: t.told)), None)
+    return next((t.flag for t in sorted(after_onset(record), key=lambda t: t.reported_at)), None)
 
 
 def _unexpected(record: Record) -> int:
@@ -355,8 +355,8 @@ def _false_score(estimator: str, sea: str, is_real: bool, gliders: Sequence[Reco
         is_real,
         len(gliders),
         sum(map(healthy_time, gliders)) / MONTH,
-        _rate(gliders, lambda r: false_told(r, 1), healthy_time),
-        _rate(gliders, lambda r: false_told(r, 2), healthy_time),
+        _rate(gliders, lambda r: false_openings(r, 1), healthy_time),
+        _rate(gliders, lambda r: false_openings(r, 2), healthy_time),
         flags.count(1) / judged,
         flags.count(2) / judged,
     )

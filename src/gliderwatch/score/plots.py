@@ -81,8 +81,8 @@ def _draw_delay(axis: Any, scores: Sequence[FaultScore], colour: str, name: str,
         ([s.hours_90 for s in scores], 0.35, None),
         ([s.hours_median for s in scores], 1.0, name),
     ):
-        known = [h if math.isfinite(h) else math.nan for h in hours]
-        axis.plot(sizes, known, "o-", color=colour, alpha=alpha, label=label, markersize=4)
+        finite = [h if math.isfinite(h) else math.nan for h in hours]
+        axis.plot(sizes, finite, "o-", color=colour, alpha=alpha, label=label, markersize=4)
         never = [s for s, h in zip(sizes, hours, strict=True) if not math.isfinite(h)]
         axis.plot(never, [top] * len(never), "x", color=colour, alpha=alpha)
     for s in scores:

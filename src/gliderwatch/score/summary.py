@@ -24,16 +24,16 @@ from gliderwatch.score.measures import (
     OpenedIncident,
     Record,
     detection,
+    false_openings,
     false_scores,
-    false_told,
     fault_scores,
     healthy_time,
 )
 
 # ----------------------------------------
-# What other bounds of the normal speed would have told, from recorded speeds. Pure.
+# What other bounds of the normal speed would have reported, from recorded speeds. Pure.
 #
-# The estimate does not depend on the bounds, so that it need not be made anew: the flags are given again to
+# The estimate does not depend on the bounds, so that it need not be made again: the flags are given again to
 # the speeds as known in the end, and put through the same rules.
 
 LOWER = (0.2, 0.3, 0.4, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95)
@@ -42,8 +42,8 @@ LOWER = (0.2, 0.3, 0.4, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95)
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """At a lower bound: the part of gliders with a loss of speed that was told, and false messages of flag 1
-    a glider-month."""
+    """At a lower bound: the part of gliders with a loss of speed that was reported, and false messages of
+    flag 1 a glider-month."""
 
     estimator: str
     lower: float
@@ -63,7 +63,7 @@ def points(records: Sequence[Record], rules: RuleParams | None = None) -> list[P
             time = sum(map(healthy_time, alone))
             if slow and time > 0:
                 share = sum(detection(r) is not None for r in slow) / len(slow)
-                false = sum(false_told(r, Flag.ANOMALY) for r in alone) * MONTH / time
+                false = sum(false_openings(r, Flag.ANOMALY) for r in alone) * MONTH / time
                 found.append(Point(estimator, lower, share, false))
     return found
 
@@ -71,16 +71,16 @@ def points(records: Sequence[Record], rules: RuleParams | None = None) -> list[P
 def judged(record: Record, lower: float, rules: RuleParams) -> Record:
     """The record as it would be with another normal range: ``lower`` and 2 - ``lower`` of the usual speed."""
     low, high = lower * record.usual, (2 - lower) * record.usual
-    watches, told = RuleStates(), list[OpenedIncident]()
+    states, openings = RuleStates(), list[OpenedIncident]()
     seen: set[str] = set()
     for dive in record.dives:
-        watches, incidents = advance(watches, _assessment(dive, low, high), rules)
+        states, incidents = advance(states, _assessment(dive, low, high), rules)
         for incident in incidents:
             if incident.id not in seen:
                 seen.add(incident.id)
                 flag = Flag.ANOMALY if incident.kind == Kind.ANOMALY else Flag.FALSE_ALARM
-                told.append(OpenedIncident(int(flag), incident.opened_at, incident.opened_at))
-    return replace(record, low=low, high=high, told=tuple(told))
+                openings.append(OpenedIncident(int(flag), incident.opened_at, incident.opened_at))
+    return replace(record, low=low, high=high, openings=tuple(openings))
 
 
 def _assessment(dive: DiveResult, low: float, high: float) -> Assessment:

@@ -42,7 +42,7 @@ from gliderwatch.store.database import MEMORY
 from gliderwatch.store.state_file import File, Status, Store
 
 _QUIET = replace(NOBODY, limits=lambda glider: {})
-"""Nobody is told, and no rule of health asked: what is scored is the flight."""
+"""No message goes out, and no rule of health runs: what is scored is the flight."""
 
 # ----------------------------------------
 # One glider through the real program: its files are made, replayed, and what came of it is written down.
@@ -154,10 +154,10 @@ def _replayed(
     onset = scenario.faults[0].onset if scenario.faults else None
     usual = _usual(mission.truth, onset if onset is not None else scenario.start + 5 * 86400)
     low, high = (part * usual for part in cell.normal)
-    told: list[OpenedIncident] = []
+    openings: list[OpenedIncident] = []
 
-    def on_file(taken: FileOutcome) -> None:
-        told.extend(_openings(taken.alerts, on_shore[taken.file.path]))
+    def on_file(outcome: FileOutcome) -> None:
+        openings.extend(_openings(outcome.alerts, on_shore[outcome.file.path]))
 
     config = configuration(estimator, scenario.glider, low, high)
     request = Request((folder / "gliders",), (folder / "cache",), config)
@@ -181,7 +181,7 @@ def _replayed(
         high=high,
         surfacings=tuple(dive.t_surface for dive in mission.truth),
         dives=dives,
-        told=tuple(told),
+        openings=tuple(openings),
         seconds=round(time.monotonic() - begun, 3),
         next=upcoming,
     )
@@ -193,7 +193,7 @@ def _usual(truth: Sequence[DiveTruth], until: float) -> float:
 
 
 def _openings(alerts: Iterable[Alert], on_shore: float) -> list[OpenedIncident]:
-    """The messages that open an incident; one cannot be told before its surfacing."""
+    """The messages that open an incident; none is reported before its surfacing."""
     return [
         OpenedIncident(_FLAGS[alert.kind], alert.time, max(alert.time, on_shore))
         for alert in alerts
@@ -258,7 +258,7 @@ def _run_real(cell: Cell, mission: Path, estimators: Iterable[str]) -> list[Reco
     onset = dives[len(dives) // 2].t_dive
     before = [speed for t, speed in own_speeds(dives).items() if t < onset]
     if not before:
-        raise GliderwatchError(f"{mission} reports no current: what is usual of its speed cannot be known")
+        raise GliderwatchError(f"{mission} reports no current: what is usual of its speed cannot be found")
     usual = median(before)
     if cell.graft is not None:
         segments = tuple(grafted(segments, cell.graft, onset, usual))
@@ -270,7 +270,7 @@ def _run_real(cell: Cell, mission: Path, estimators: Iterable[str]) -> list[Reco
     for name in estimators:
         begun = time.monotonic()
         config = configuration(name, segments[0].id.glider, low, high)
-        store, told = _fed(segments, config)
+        store, openings = _fed(segments, config)
         out.append(
             Record(
                 estimator=name,
@@ -287,7 +287,7 @@ def _run_real(cell: Cell, mission: Path, estimators: Iterable[str]) -> list[Reco
                 high=high,
                 surfacings=surfacings,
                 dives=tuple(_result(a, None) for a in store.assessments(segments[0].id.glider)),
-                told=told,
+                openings=openings,
                 seconds=round(time.monotonic() - begun, 3),
                 next=forecast_results(
                     store.forecasts(segments[0].id.glider),
@@ -301,14 +301,17 @@ def _run_real(cell: Cell, mission: Path, estimators: Iterable[str]) -> list[Reco
 
 
 def _fed(segments: Iterable[Segment], config: Config) -> tuple[Store, tuple[OpenedIncident, ...]]:
-    """A store that has taken the segments in, and what was told. When a file came to shore is not known of a
-    real mission: not before the last value in it."""
-    store, told = Store.open(MEMORY), list[OpenedIncident]()
+    """A store with the segments, and the incidents that were opened.
+
+    When a file of a real mission came to shore is not known: not before the last value in it."""
+    store, openings = Store.open(MEMORY), list[OpenedIncident]()
     for segment in segments:
         file = File(segment.id.name, 0, 0, Status.WAITING, segment.id.glider, segment.id.name)
-        taken = transaction.process_file(store, file, segment, config.glider(segment.id.glider), _QUIET, 0.0)
-        told += _openings(taken.alerts, segment.last_t)
-    return store, tuple(told)
+        outcome = transaction.process_file(
+            store, file, segment, config.glider(segment.id.glider), _QUIET, 0.0
+        )
+        openings += _openings(outcome.alerts, segment.last_t)
+    return store, tuple(openings)
 
 
 # ----------------------------------------

@@ -57,7 +57,7 @@ KINDS = {
     AilmentKind.DEVICE_ERROR: _Kind(1.0, 100.0, "how many errors of its digifin"),
     AilmentKind.GLIDER_DOS: _Kind(0.0, np.inf, "of no meaning: it waits at its prompt"),
     AilmentKind.LASTGASP: _Kind(0.0, np.inf, "of no meaning: it runs lastgasp.mi"),
-    AilmentKind.RESET: _Kind(0.0, np.inf, "of no meaning: its counters begin anew"),
+    AilmentKind.RESET: _Kind(0.0, np.inf, "of no meaning: its counters begin again"),
 }
 
 
@@ -74,10 +74,11 @@ class Ailment:
     size: float = 1.0
 
     def __post_init__(self) -> None:
-        known = KINDS[self.kind]
-        if not known.least <= self.size <= known.most:
+        bounds = KINDS[self.kind]
+        if not bounds.least <= self.size <= bounds.most:
             raise ValueError(
-                f"{self.kind} of size {self.size:g}: it is {known.meaning}, {known.least:g} to {known.most:g}"
+                f"{self.kind} of size {self.size:g}: it is {bounds.meaning}, {bounds.least:g} "
+                f"to {bounds.most:g}"
             )
 
 

@@ -44,7 +44,7 @@ class CallRates:
     """Parts of 1: of the calls ``dropped``, without a file (``no_file``), and in which a pilot types
     (``typing``); of the lines ``garbled``.
 
-    ``abort`` is the day of the mission from whose first call on an abort is told (None: never), by
+    ``abort`` is the day of the mission from whose first call on an abort is printed (None: never), by
     ``cause``. From then on the glider waits at its prompt.
     """
 
@@ -84,13 +84,14 @@ def call_logs(
     """The log of each call of a mission, in order of time."""
     rng, typing, scenario = mission.scenario.rng(7), mission.scenario.rng(9), mission.scenario
     calls, closing = make_calls(mission), _Closing(mission)
-    told = False
+    is_reported = False
     for t, sendings in zip(calls.times, calls.sendings, strict=True):
         chance = rng.random(4)
         is_lost = rates.abort is not None and t >= scenario.start + rates.abort * DAY
         fate = _fate(rates, ailments, t, chance)
         if is_lost:
-            fate, told = (Fate.GLIDER_DOS, told) if told else (Fate.ABORT, True)
+            fate = Fate.GLIDER_DOS if is_reported else Fate.ABORT
+            is_reported = True
         files = [s.segment for s in sendings]
         lines = [
             *_status(mission, t, fate, closing.before(t)),
@@ -191,7 +192,7 @@ def _sensors(segment: SegmentData, t: float) -> list[str]:
 
 
 def _devices(start: float, t: float, ailments: tuple[Ailment, ...]) -> list[str]:
-    """The counts of all devices, and of the digifin alone; a reset has them begin anew."""
+    """The counts of all devices, and of the digifin alone; a reset starts them at 0."""
     reset = of_kind(ailments, AilmentKind.RESET, t)
     since = start if reset is None else reset.onset
     found = of_kind(ailments, AilmentKind.DEVICE_ERROR, t)

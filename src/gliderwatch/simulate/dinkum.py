@@ -1,7 +1,7 @@
 """Writes Dinkum binary files of encoding version 5, as Slocum gliders do. Pure: values in, bytes out.
 
 A file is an ASCII header of 14 tags, the list of sensors (or, factored, only its checksum: the
-list is then in a cache file named after it), a cycle of known values that tells the byte order,
+list is then in a cache file named after it), a cycle of fixed values that tells the byte order,
 and one data cycle a line: `d`, two bits a sensor (0 not updated, 1 updated to the value it had,
 2 updated and written), and the written values. Layout and checksum were taken from real files of
 two generations of gliders: what is encoded here again from such a file has the same bytes.
@@ -115,9 +115,9 @@ def encode(
             f"values {values.shape} and updated {updated.shape}: need {len(columns)} columns, one a sensor"
         )
     order, end = generation.value
-    known = b"sa" + struct.pack(f"{order}Hfd", 0x1234, 123.456, 123456789.12345)
+    fixed = b"sa" + struct.pack(f"{order}Hfd", 0x1234, 123.456, 123456789.12345)
     listed = b"" if factored else sensors.text()
-    return _tags(header, sensors, factored) + listed + known + _cycles(columns, values, updated, order) + end
+    return _tags(header, sensors, factored) + listed + fixed + _cycles(columns, values, updated, order) + end
 
 
 def _tags(header: Header, sensors: SensorList, factored: bool) -> bytes:

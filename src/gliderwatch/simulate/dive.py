@@ -221,12 +221,12 @@ def _log_power(glider: Glider, nodes: Cycles, motion: Motion) -> None:
 def _log_bottom(glider: Glider, cycles: Cycles, motion: Motion, depth: Array) -> None:
     """The altimeter hears the bottom on the way down, within its range."""
     altitude = motion.water_depth[::NODE] - depth
-    heard = (motion.pitch[::NODE] < -0.1) & (altitude < _RANGE) & (altitude > 0)
+    echoes = (motion.pitch[::NODE] < -0.1) & (altitude < _RANGE) & (altitude > 0)
     noise = 0.1 * glider.luck.standard_normal(len(cycles))
-    heights = np.maximum(altitude[heard] + noise[heard], 0.1)
-    glider.log.add("m_altitude", cycles[heard], heights)
+    heights = np.maximum(altitude[echoes] + noise[echoes], 0.1)
+    glider.log.add("m_altitude", cycles[echoes], heights)
     glider.log.add("m_water_depth", cycles[0], -1.0)
-    glider.log.add("m_water_depth", cycles[heard], heights + depth[heard])
+    glider.log.add("m_water_depth", cycles[echoes], heights + depth[echoes])
 
 
 def log_science(glider: Glider, motion: Motion, way: Way) -> None:
@@ -262,7 +262,7 @@ def dive(glider: Glider, segment: str) -> Flown:
     """Dive, and be at the surface again; ``segment`` names the file that logs it."""
     scenario, rng, start = glider.scenario, glider.rng, glider.cycle
     _face_the_stream(glider)
-    glider.trim_anew()
+    glider.wander_trim()
     motion = fly(glider)
     n = len(motion.depth)
     t = glider.times(start + np.arange(n))

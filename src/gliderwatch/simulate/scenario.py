@@ -83,10 +83,11 @@ class Fault:
     ramp: float = 0.0
 
     def __post_init__(self) -> None:
-        known = SIZES[self.kind]
-        if not known.least <= self.size <= known.most:
+        bounds = SIZES[self.kind]
+        if not bounds.least <= self.size <= bounds.most:
             raise ValueError(
-                f"{self.kind} of size {self.size:g}: it is {known.meaning}, {known.least:g} to {known.most:g}"
+                f"{self.kind} of size {self.size:g}: it is {bounds.meaning}, {bounds.least:g} "
+                f"to {bounds.most:g}"
             )
         if not 0 <= self.ramp < np.inf:
             raise ValueError(f"{self.kind} with a ramp of {self.ramp:g} s: it grows in 0 s or more")

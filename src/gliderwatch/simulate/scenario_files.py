@@ -135,12 +135,12 @@ def find(name: str) -> Path:
 
     Raises `ConfigError` where there is none.
     """
-    known = shipped()
-    if name in known:
-        return known[name]
+    scenarios = shipped()
+    if name in scenarios:
+        return scenarios[name]
     if Path(name).is_file():
         return Path(name)
-    raise ConfigError(f"there is no scenario {name}, nor a file of that name ({nearest(name, known)})")
+    raise ConfigError(f"there is no scenario {name}, nor a file of that name ({nearest(name, scenarios)})")
 
 
 def load_scenario(path: Path) -> Scenario:

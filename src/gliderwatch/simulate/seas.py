@@ -1,7 +1,7 @@
 """Kinds of sea, and one glider's mission in each for every seed. Pure.
 
 What makes a kind is the range that each of its numbers is drawn from; they are those of real seas, and
-know nothing of what will be estimated. Drawn anew for each seed: the place and the date; strength, shape,
+know nothing of what will be estimated. Each seed draws: the place and the date; strength, shape,
 inclination and phases of the tides; the wandering part, the front; where the waypoints are, how often
 the glider comes up, how deep it goes, how fast it flies, which sensors it sends at what cadence.
 

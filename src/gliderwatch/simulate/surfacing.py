@@ -125,7 +125,7 @@ def drift(glider: Glider, plan: Plan) -> Fixes:
     return Fixes(cycles, lat, lon)
 
 
-def heard(glider: Glider, plan: Plan, fixes: Fixes) -> Fixes:
+def shared_fixes(glider: Glider, plan: Plan, fixes: Fixes) -> Fixes:
     """The fixes that the glider really has: without those in whose place the old one is reported."""
     if not plan.stale:
         return fixes
@@ -162,11 +162,11 @@ def surface(glider: Glider, flown: Flown | None) -> tuple[Plan, DiveTruth | None
     """
     plan = make_plan(glider)
     fixes = drift(glider, plan)
-    known = heard(glider, plan, fixes)
-    seen = seen_drift(glider, known)
-    _log(glider, plan, fixes, known)
-    truth = _reckon(glider, flown, plan, known, seen) if flown else None
-    glider.fix, glider.fix_cycle = known.point(-1), int(known.cycles[-1])
+    shared = shared_fixes(glider, plan, fixes)
+    seen = seen_drift(glider, shared)
+    _log(glider, plan, fixes, shared)
+    truth = _reckon(glider, flown, plan, shared, seen) if flown else None
+    glider.fix, glider.fix_cycle = shared.point(-1), int(shared.cycles[-1])
     glider.drift = seen
     if plan.restart:
         glider.lmc = glider.fix
@@ -219,10 +219,10 @@ def _reported(glider: Glider, flown: Flown, water: Vector) -> Vector:
     return Vector(water.east - wrong * flown.own.north / way, water.north + wrong * flown.own.east / way)
 
 
-def _log(glider: Glider, plan: Plan, fixes: Fixes, known: Fixes) -> None:
+def _log(glider: Glider, plan: Plan, fixes: Fixes, shared: Fixes) -> None:
     """Log GPS and depth; a newly opened file repeats the fix known so far, as gliders do."""
     log, rng = glider.log, glider.rng
-    fresh = fixes.cycles >= known.cycles[0]
+    fresh = fixes.cycles >= shared.cycles[0]
     files = [plan.opened, *(plan.own_file or ())[:1]]
     for name, values, old in (("lat", fixes.lat, glider.fix.lat), ("lon", fixes.lon, glider.fix.lon)):
         reported = np.where(fresh, values, old)
@@ -232,13 +232,13 @@ def _log(glider: Glider, plan: Plan, fixes: Fixes, known: Fixes) -> None:
             log.add(f"m_gps_{name}", opened, written(np.asarray(repeated)))
         log.add(f"m_gps_{name}", fixes.cycles, written(reported))
         log.add(f"m_{name}", fixes.cycles[fresh], written(values[fresh]))
-    place = glider.to_lmc(known.point(-1))
-    log.add("m_x_lmc", known.cycles[-1], place.east)
-    log.add("m_y_lmc", known.cycles[-1], place.north)
+    place = glider.to_lmc(shared.point(-1))
+    log.add("m_x_lmc", shared.cycles[-1], place.east)
+    log.add("m_y_lmc", shared.cycles[-1], place.north)
     log.add("m_gps_status", [plan.up, *files], 2)
     log.add("m_gps_status", fixes.cycles, np.where(fresh, 0, 1))
     log.add("m_gps_mag_var", fixes.cycles, glider.scenario.variation)
-    states = (plan.up, DR_AWAITING_FIX), (int(known.cycles[0]), DR_AWAITING_POSTFIX)
+    states = (plan.up, DR_AWAITING_FIX), (int(shared.cycles[0]), DR_AWAITING_POSTFIX)
     for cycle, state in (*states, (plan.last, DR_AWAITING_DIVE)):
         log.add("x_dr_state", cycle, state)
     cycles = np.arange(plan.up + 1, plan.down)

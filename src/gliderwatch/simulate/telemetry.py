@@ -131,14 +131,14 @@ def sensor_list(cadence: Mapping[str, float], *, science: bool = False) -> Senso
     Raises:
         ValueError: a sensor that is not simulated.
     """
-    known = SCIENCE_SENSORS if science else SENSORS
-    names = [sensor.name for sensor in known]
+    sensors = SCIENCE_SENSORS if science else SENSORS
+    names = [sensor.name for sensor in sensors]
     for name in cadence:
         if name not in names:
             close = difflib.get_close_matches(name, names, n=1)
             cure = f"did you mean {close[0]}?" if close else f"choose from {', '.join(names)}"
             raise ValueError(f"{name} is not simulated: {cure}")
-    return SensorList(known, frozenset(cadence) | {SCIENCE_TIME if science else TIME})
+    return SensorList(sensors, frozenset(cadence) | {SCIENCE_TIME if science else TIME})
 
 
 # ----------------------------------------

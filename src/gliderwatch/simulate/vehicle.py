@@ -64,7 +64,7 @@ class Glider:
         self.health, self.trimming = self.scenario.health, self.scenario.rng(4)
         self.trim = float(self.trimming.standard_normal())
 
-    def trim_anew(self) -> None:
+    def wander_trim(self) -> None:
         """Let ``trim`` wander by the time of a dive."""
         kept = exp(-self.scenario.interval / _TRIM_MEMORY)
         self.trim = kept * self.trim + sqrt(1 - kept**2) * float(self.trimming.standard_normal())

@@ -1,4 +1,4 @@
-"""Lines that many messages share: where it is, when it calls, how to take it on, numbers of a dive. Pure."""
+"""Phrases that many messages share: where a glider is, when it calls, numbers of a dive, links. Pure."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from gliderwatch.messages.formatting import (
     UNKNOWN,
     clean,
     duration,
+    finite,
     flow,
-    known,
     map_link,
     place,
     short_place,
@@ -30,7 +30,7 @@ def name_of(glider: str) -> str:
 
 def exact_speed(a: Assessment) -> str:
     """The speed, with a third digit where two would make it look within its range though it is not."""
-    value = known(a.speed)
+    value = finite(a.speed)
     if value is not None and out_of_range(a, value) and not out_of_range(a, round(value, 2)):
         return f"{value:.3f} m/s"
     return speed(value)
@@ -38,7 +38,7 @@ def exact_speed(a: Assessment) -> str:
 
 def speed_and_range(a: Assessment) -> str:
     """The speed through the water beside what is normal."""
-    value = "speed not known" if known(a.speed) is None else exact_speed(a)
+    value = "speed not known" if finite(a.speed) is None else exact_speed(a)
     return f"{value} ({normal_range(a)})"
 
 
@@ -70,7 +70,7 @@ def trend(situation: Situation) -> str:
     """The last speeds, oldest first; empty where there are none."""
     if not situation.speeds:
         return ""
-    values = ", ".join("?" if (v := known(x)) is None else f"{v:.2f}" for x in situation.speeds)
+    values = ", ".join("?" if (v := finite(x)) is None else f"{v:.2f}" for x in situation.speeds)
     return f"{values} m/s"
 
 
@@ -91,7 +91,7 @@ def take_on_thread(glider: str) -> Pairs:
     return (("Take it on", command(f"ack {glider}")),)
 
 
-def silence(glider: str) -> Pairs:
+def mute_link(glider: str) -> Pairs:
     """How to keep a glider quiet while somebody works on what is no incident."""
     return (("Quiet while you work on it", command(f"mute {glider} --hours 6")),)
 
@@ -99,7 +99,7 @@ def silence(glider: str) -> Pairs:
 def dive_numbers(a: Assessment, situation: Situation) -> Pairs:
     """Speeds, place and currents of a dive, in numbers."""
     last, sigma, middle = trend(situation), number(a, "speed_sigma"), number(a, "usual_speed")
-    exact = exact_speed(a) + (f" ± {sigma:.2f}" if sigma is not None and known(a.speed) is not None else "")
+    exact = exact_speed(a) + (f" ± {sigma:.2f}" if sigma is not None and finite(a.speed) is not None else "")
     often = f", usually {middle:.2f}" if middle is not None else ""
     reference = flow(a.reference_u, a.reference_v)
     if reference != UNKNOWN:
