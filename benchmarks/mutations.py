@@ -30,8 +30,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "src" / "gliderwatch"
 TESTS = {
-    "navigation": "unit/test_heuristics_navigation unit/test_current unit/test_dives unit/test_features"
-    " unit/test_fixes unit/test_flight unit/test_samples unit/test_track",
+    "navigation": "unit/test_heuristics_navigation unit/test_dac unit/test_dives unit/test_features"
+    " unit/test_fixes unit/test_flight unit/test_flight_samples unit/test_track",
     "sea": "unit/test_heuristics_sea unit/test_gauss_markov unit/test_ocean_field unit/test_tides"
     " integration/test_ocean",
     "estimation": "unit/test_heuristics_estimation unit/test_verdict_misfit unit/test_speed_range"
@@ -41,8 +41,8 @@ TESTS = {
     "forecast": "unit/test_heuristics_forecast unit/test_kalman_expected_flow unit/test_forecast_steering"
     " unit/test_forecast_surfacing unit/test_forecast_timing unit/test_forecast_waypoints"
     " property/test_forecast",
-    "incidents": "unit/test_heuristics_rules unit/test_announce unit/test_incident unit/test_silence"
-    " unit/test_unknown unit/test_waiting",
+    "incidents": "unit/test_heuristics_incidents unit/test_notifications unit/test_state_machine"
+    " unit/test_overdue unit/test_unjudged unit/test_send_schedule",
 }
 """The fast tests of each room."""
 CHANGES = {"half": 0.5, "double": 2.0}

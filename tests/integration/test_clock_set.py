@@ -132,7 +132,7 @@ class TestNotKnownByHowMuch:
         assert not [a for a in alerts if a.kind == Kind.OVERDUE]
         signs = store.facts("unit").signs(0.0)
         expected = store.facts("unit").expected(LOST_CAME[-1])
-        assert overdue.expected_call(expected, signs, LOST_CAME[-1], None).heard == LOST_CAME[-1]
+        assert overdue.expected_call(expected, signs, LOST_CAME[-1], None).last_sign == LOST_CAME[-1]
 
     def test_a_glider_that_was_overdue_has_called(self):
         store, _ = live(MISSION[:14], CAME[:14])

@@ -177,7 +177,7 @@ def test_an_open_incident_keeps_all_that_is_since():
 def test_an_end_that_was_not_told_keeps_its_incident(store):
     said = store.notified("unit")
     (thread,) = said.threads
-    open_ = replace(thread, told=replace(thread.told, cleared_at=None))
+    open_ = replace(thread, reported=replace(thread.reported, cleared_at=None))
     with store.transaction():
         post_alerts(store, "unit", replace(said, threads=(open_,)), (), lambda alert: (), 0.0)
     clear(store)

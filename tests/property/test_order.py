@@ -147,7 +147,9 @@ def test_no_message_twice_in_any_order(there):
     assert_same(ending(store, "unit"), ending(feed(whole, EAGER), "unit"))
     open_now = {i.id for i in store.incidents("unit") if i.cleared_at is None}
     told = {
-        t.told.id for t in store.notified("unit").threads if not t.withdrawn and t.told.cleared_at is None
+        t.reported.id
+        for t in store.notified("unit").threads
+        if not t.withdrawn and t.reported.cleared_at is None
     }
     assert told == open_now
 

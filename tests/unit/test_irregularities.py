@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from clocks import shifted
-from gliderwatch.incidents.irregularities import due, found
+from gliderwatch.incidents.irregularities import due, irregularities
 from gliderwatch.messages import irregularity_text
 from gliderwatch.model import Fix, Kind
 from missions import START, Leg, feed, mission
@@ -20,7 +20,7 @@ def places(*spots, step=3 * HOUR):
 
 
 def test_places_that_alternate_are_of_two_gliders():
-    (told,) = found("unit", [], places(HERE, THERE, HERE, THERE, HERE, THERE))
+    (told,) = irregularities("unit", [], places(HERE, THERE, HERE, THERE, HERE, THERE))
     title, page = irregularity_text.irregular("", told)
     assert title == "unit TWO GLIDERS under this name"
     text = page.text()
@@ -40,11 +40,11 @@ def test_places_that_alternate_are_of_two_gliders():
     ids=["one place", "one wild fix", "two wild fixes", "redeployed", "near enough to fly"],
 )
 def test_what_one_glider_does_is_not(spots):
-    assert not found("unit", [], places(*spots))
+    assert not irregularities("unit", [], places(*spots))
 
 
 def test_it_is_said_once_and_not_of_the_past():
-    wrong = found("unit", [], places(*[HERE, THERE] * 4))
+    wrong = irregularities("unit", [], places(*[HERE, THERE] * 4))
     now = START + 25 * HOUR
     ids, (alert,) = due((), wrong, now)
     assert alert.kind == Kind.OPERATOR and alert.glider == ""
@@ -65,7 +65,7 @@ def test_two_gliders_whose_files_come_under_one_name(later):
         other.append(replace(moved, id=replace(moved.id, name=f"unit-2023-318-7-{k}")))
     files = random.Random(7).sample(one + other, len(one + other))
     store = feed(files)
-    assert [irregularity_text.title(i) for i in found("unit", [], store.facts("unit").places(12))] == [
+    assert [irregularity_text.title(i) for i in irregularities("unit", [], store.facts("unit").places(12))] == [
         "files of two gliders come under the name unit"
     ]
     assert not store.incidents("unit")

@@ -15,7 +15,7 @@ import pytest
 from rich.console import Console
 
 from alert_support import DISAGREE, SLOW, alert, incident
-from announcing import Talk, World
+from dives_by_letters import Talk, World
 from gliderwatch.cli import manage, tables
 from gliderwatch.cli.status import (
     acknowledge_incident,
@@ -67,33 +67,35 @@ def put_incident(store: Store, i: object) -> None:
 
 class TestAcknowledged:
     def test_reminders_stop_and_the_all_clear_comes(self) -> None:
-        said = {taken_on: self._kinds("0" + "1" * 30, "0" + "1" * 30 + "00", taken_on) for taken_on in (0, 1)}
-        assert said[0] == ["anomaly", "reminder", "reminder", "all_clear"]  # after 1 and 2 days
-        assert said[1] == ["anomaly", "all_clear"]
+        notified = {
+            taken_on: self._kinds("0" + "1" * 30, "0" + "1" * 30 + "00", taken_on) for taken_on in (0, 1)
+        }
+        assert notified[0] == ["anomaly", "reminder", "reminder", "all_clear"]  # after 1 and 2 days
+        assert notified[1] == ["anomaly", "all_clear"]
 
     def test_they_come_again_when_it_grows_worse(self) -> None:
         assert self._kinds("0" + "1" * 12, "0" + "1" * 12 + "S", 1) == ["anomaly", "reminder"]
 
     def _kinds(self, letters: str, end: str, taken_on: int) -> list[str]:
         talk = Talk(reminder_hours=24.0)
-        kinds = talk.hear(letters[:3])
+        kinds = talk.update(letters[:3])
         (opened,) = World.of(letters[:3]).incidents()
         acks = {opened.id: acknowledge(opened, "ann", "", 0.0)} if taken_on else {}
-        for known in [World.of(letters[:n]) for n in range(4, len(letters) + 1)] + [World.of(end)]:
-            talk.said, new = due_notifications(talk.said, known, talk.reminder_hours, False, acks)
+        for facts in [World.of(letters[:n]) for n in range(4, len(letters) + 1)] + [World.of(end)]:
+            talk.notified, new = due_notifications(talk.notified, facts, talk.reminder_hours, False, acks)
             kinds += [str(a.kind) for a in new]
         return kinds
 
     def test_it_holds_when_late_data_change_the_id(self) -> None:
         """The dive before the first flagged one comes late, and is flagged too."""
         talk, letters = Talk(reminder_hours=24.0), "0 11" + "1" * 20
-        talk.hear(letters[:5])
+        talk.update(letters[:5])
         (opened,) = World.of(letters[:5]).incidents()
         acks = {opened.id: acknowledge(opened, "ann", "", 0.0)}
         for n in range(6, len(letters) + 1):
-            known = World.of("01" + letters[2:n])
-            assert {i.id for i in known.incidents()}.isdisjoint(acks)
-            talk.said, new = due_notifications(talk.said, known, 24.0, False, acks)
+            facts = World.of("01" + letters[2:n])
+            assert {i.id for i in facts.incidents()}.isdisjoint(acks)
+            talk.notified, new = due_notifications(talk.notified, facts, 24.0, False, acks)
             assert "reminder" not in {str(a.kind) for a in new}
 
     @pytest.mark.parametrize(
@@ -174,10 +176,10 @@ class TestAsTold:
         """Messages after other code sees other dives: with and without `as_told`."""
         talk, without = Talk(), Talk()
         for n in range(1, len(before) + 1):
-            talk.hear(before[:n])
-            without.hear(before[:n])
-        talk.said = as_notified(talk.said, World.of(after))
-        return talk.hear(after), without.hear(after)
+            talk.update(before[:n])
+            without.update(before[:n])
+        talk.notified = as_notified(talk.notified, World.of(after))
+        return talk.update(after), without.update(after)
 
     @pytest.mark.parametrize(
         ("before", "after", "without"),
@@ -288,11 +290,11 @@ class TestWaiting:
         """An alert that the duty pilot got and that waits for the chief; a notice that waits for morning."""
         quiet = QuietHours(time(22), time(7), UTC, Severity.CRITICAL)
         waits = {"mail": [Wait()], "sms": [Wait(after=1800.0)]}
-        said = NotificationState((Thread(incident().id, incident(), incident().last, 1, 0.0),))
+        notified = NotificationState((Thread(incident().id, incident(), incident().last, 1, 0.0),))
         with closing(Store.open(Path(config.state.path))) as store:
-            post_alerts(store, "electa", said, [alert()], lambda a: waits, NOW)
+            post_alerts(store, "electa", notified, [alert()], lambda a: waits, NOW)
             notice = alert("n", incident="", audience=Severity.INFO)
-            post_alerts(store, "electa", said, [notice], lambda a: {"post": [Wait(quiet=quiet)]}, NOW)
+            post_alerts(store, "electa", notified, [notice], lambda a: {"post": [Wait(quiet=quiet)]}, NOW)
 
     def waiting(self, config: Config) -> list[tuple[str, str]]:
         with closing(Store.reading(Path(config.state.path))) as store:

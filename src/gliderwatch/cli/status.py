@@ -240,7 +240,7 @@ class GliderStatus:
     @property
     def is_over(self) -> bool:
         """Whether nothing was heard for so long that the deployment counts as over."""
-        return self.awaited is not None and self.at - self.awaited.heard >= GONE
+        return self.awaited is not None and self.at - self.awaited.last_sign >= GONE
 
     @property
     def is_muted(self) -> bool:
@@ -437,7 +437,7 @@ def _silence(g: GliderStatus) -> dict[str, Any]:
             "lon": place[1] if place is not None else None,
             "source": g.expected.source,
         },
-        "heard": iso_ms(call.heard) if call is not None else None,
+        "heard": iso_ms(call.last_sign) if call is not None else None,
         "overdue_at": iso_ms(call.due) if call is not None else None,
         "overdue": g.overdue_since is not None,
         "ended": g.is_over,

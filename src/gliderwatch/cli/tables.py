@@ -209,8 +209,8 @@ def _next(g: GliderStatus) -> list[tuple[str, str]]:
         why = "no dive yet" if g.latest is None else "its next surfacing cannot be said yet"
         return [*lines, ("dim", f"{name}: not missed while it is silent, {why}")]
     if g.is_over:
-        return [*lines, ("dim", f"{name}: last heard {utc(call.heard)}, its deployment seems over")]
-    silent = duration(g.at - call.heard)
+        return [*lines, ("dim", f"{name}: last heard {utc(call.last_sign)}, its deployment seems over")]
+    silent = duration(g.at - call.last_sign)
     if g.overdue_since is not None:
         text = f"{name}: OVERDUE since {utc(g.overdue_since)}, silent for {silent}"
         return [*lines, ("bold red", text)]

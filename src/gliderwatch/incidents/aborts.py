@@ -1,7 +1,8 @@
-"""Aborts and what comes of them, as a glider tells them in its calls: each is told once. Pure.
+"""Aborts and what follows them, as a glider reports them in its calls: people are notified of each once.
+Pure.
 
 A glider prints its abort history at every call until it is reset: news is a count that grows or a later time.
-As with incidents, messages are the difference between what the calls tell and what people have been told.
+As with incidents, messages are the difference between what the calls report and what people were notified of.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from gliderwatch.incidents.acknowledgement import Acks, is_taken_on
+from gliderwatch.incidents.acknowledgement import Acks, is_acknowledged
 from gliderwatch.incidents.notices import Aborted, AbortReport, Notice, Resumed, StillAborted
 from gliderwatch.incidents.send_schedule import is_reminder_due
 from gliderwatch.incidents.threads import thread_id
@@ -19,7 +20,7 @@ from gliderwatch.model import Aborts, Call, Happened, Happening, Kind, Severity
 SAME = 1800.0
 """Seconds: two lines about an abort that are no further apart are about the same one."""
 NEWS = 86400.0
-"""Seconds: what was told in a call that was over for longer when its log came is history, not news."""
+"""Seconds: what was reported in a call that was over for longer when its log came is history, not news."""
 LAST_MISSIONS = ("lastgasp.mi", "initial.mi")
 _SEVERITIES = {
     Happening.ABORTING: Severity.CRITICAL,
@@ -41,7 +42,7 @@ _LOUDEST = (
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class ReportInCall:
     """What a `call` reported, as it is to be reported on."""
 
     report: AbortReport
@@ -50,11 +51,11 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Episode:
-    """What people have been ``told`` since a glider fell out of its mission, in so many ``messages``, the
-    last at ``time`` (s); ``cleared`` when it was in its mission again (s)."""
+    """What people were notified of since a glider fell out of its mission: the ``reports`` in so many
+    ``messages``, the last at ``time`` (s); ``cleared`` when it was in its mission again (s)."""
 
     id: str
-    told: tuple[AbortReport, ...]
+    reports: tuple[AbortReport, ...]
     messages: int
     time: float
     cleared: float | None = None
@@ -62,21 +63,21 @@ class Episode:
     @property
     def severity(self) -> Severity:
         """How loud its loudest message was."""
-        return max(one.severity for one in self.told)
+        return max(one.severity for one in self.reports)
 
 
-def findings(calls: Iterable[Call]) -> tuple[Finding, ...]:
-    """What the calls of a glider, in order of time, tell of aborts, each once, in order of time."""
-    found: list[Finding] = []
+def reports_in_calls(calls: Iterable[Call]) -> tuple[ReportInCall, ...]:
+    """What the calls of a glider, in order of time, report of aborts, each once, in order of time."""
+    found: list[ReportInCall] = []
     before: Aborts | None = None
     for call in calls:
         for happened in call.happened:
-            found.append(Finding(_of_happened(happened), call))
+            found.append(ReportInCall(_of_happened(happened), call))
         for aborts in call.aborts:
             if aborts.count and (before is None or _is_another(before, aborts)):
-                found.append(Finding(_of_history(aborts, is_first=before is None), call))
+                found.append(ReportInCall(_of_history(aborts, is_first=before is None), call))
             before = aborts
-    out: list[Finding] = []
+    out: list[ReportInCall] = []
     for one in sorted(found, key=lambda f: (f.report.is_history, f.report.t, f.call.began)):
         if not any(_is_same(one.report, other.report) for other in out):
             out.append(one)
@@ -117,14 +118,15 @@ def announce(
     acks: Acks = MappingProxyType({}),
     reminder_hours: float | None = None,
 ) -> tuple[tuple[Episode, ...], list[Notice]]:
-    """What people have been told of aborts after the messages that are due `now` (s), and these.
+    """What people were notified of after the messages about aborts that are due `now` (s), and these
+    messages.
 
-    `calls` are those known of the last weeks, in order of time. Of what nobody has taken on (`acks`) people
-    are reminded after `reminder_hours`.
+    `calls` are those of the last weeks, in order of time. Of what nobody has acknowledged (`acks`) people are
+    reminded after `reminder_hours`.
     """
     episodes, notices = list(before), list[Notice]()
-    fresh: dict[int, list[Finding]] = {}
-    for one in findings(calls):
+    fresh: dict[int, list[ReportInCall]] = {}
+    for one in reports_in_calls(calls):
         k = _place(episodes, one.report)
         if now - one.call.last_t >= NEWS or (k is not None and _is_reported(episodes[k], one.report)):
             continue
@@ -132,9 +134,9 @@ def announce(
             k = len(episodes)
             identity = thread_id(f"{glider}/abort/{one.report.t:.0f}", [e.id for e in episodes])
             episodes.append(Episode(identity, (), 0, one.report.t))
-        was_noted = bool(episodes[k].told) and episodes[k].severity is Severity.INFO
-        cleared = None if was_noted else episodes[k].cleared
-        episodes[k] = replace(episodes[k], told=(*episodes[k].told, one.report), cleared=cleared)
+        was_info = bool(episodes[k].reports) and episodes[k].severity is Severity.INFO
+        cleared = None if was_info else episodes[k].cleared
+        episodes[k] = replace(episodes[k], reports=(*episodes[k].reports, one.report), cleared=cleared)
         fresh.setdefault(k, []).append(one)
     for k, new in fresh.items():
         episodes[k], notice = _aborted(glider, episodes[k], new)
@@ -142,8 +144,8 @@ def announce(
     for k, episode in enumerate(episodes):
         if episode.cleared is None:
             episodes[k], more = _cleared(glider, episode, calls)
-            taken_on = k in fresh or is_taken_on(acks, (episode.id,), episode.severity)
-            if not more and not taken_on:
+            needs_none = k in fresh or is_acknowledged(acks, (episode.id,), episode.severity)
+            if not more and not needs_none:
                 episodes[k], more = _reminded(glider, episode, calls, reminder_hours)
             notices += more
     return tuple(episodes), notices
@@ -152,10 +154,10 @@ def announce(
 def _place(episodes: list[Episode], report: AbortReport) -> int | None:
     """The episode that a report belongs to: it goes on, or has had it; None: a new one."""
     for k, episode in enumerate(episodes):
-        if any(_is_same(report, other) for other in episode.told):
+        if any(_is_same(report, other) for other in episode.reports):
             return k
     for k, episode in enumerate(episodes):
-        if episode.cleared is None or episode.told[0].t <= report.t <= episode.cleared:
+        if episode.cleared is None or episode.reports[0].t <= report.t <= episode.cleared:
             return k
     return None
 
@@ -164,13 +166,13 @@ def _is_reported(episode: Episode, report: AbortReport) -> bool:
     """Whether people have been notified of it: a prompt that waits is reported once, an abort is implied by
     another word for it."""
     if report.what is Happening.ABORTING:
-        same = [other for other in episode.told if _is_same(report, other)]
+        same = [other for other in episode.reports if _is_same(report, other)]
         return any(report.is_history or not other.is_history for other in same)
-    implied = report.what is Happening.FELL_OUT and any(o.what is Happening.ABORTING for o in episode.told)
-    return implied or any(report.what == other.what for other in episode.told)
+    implied = report.what is Happening.FELL_OUT and any(o.what is Happening.ABORTING for o in episode.reports)
+    return implied or any(report.what == other.what for other in episode.reports)
 
 
-def _aborted(glider: str, episode: Episode, new: list[Finding]) -> tuple[Episode, Notice]:
+def _aborted(glider: str, episode: Episode, new: list[ReportInCall]) -> tuple[Episode, Notice]:
     """The episode after one message about what is new in it, and the message."""
     reports = sorted((one.report for one in new), key=lambda r: (-r.severity, _LOUDEST.index(r.what), r.t))
     call = max((one.call for one in new), key=lambda c: c.last_t)
@@ -184,12 +186,12 @@ def _reminded(
     glider: str, episode: Episode, calls: tuple[Call, ...], hours: float | None
 ) -> tuple[Episode, list[Notice]]:
     """The episode, and the reminder of it that its last call makes due; what was only noted needs none."""
-    since, call = min(one.t for one in episode.told), max(calls, key=lambda c: c.last_t, default=None)
+    since, call = min(one.t for one in episode.reports), max(calls, key=lambda c: c.last_t, default=None)
     if call is None or episode.severity is Severity.INFO:
         return episode, []
     if not is_reminder_due(since, episode.time, call.last_t, hours):
         return episode, []
-    reports = sorted(episode.told, key=lambda r: (-r.severity, _LOUDEST.index(r.what), r.t))
+    reports = sorted(episode.reports, key=lambda r: (-r.severity, _LOUDEST.index(r.what), r.t))
     content = StillAborted(tuple(reports), call, (call.last_t - since) / 3600)
     identity, loud = f"{episode.id}/{episode.messages}", episode.severity
     notice = Notice(identity, episode.id, glider, call.last_t, Kind.REMINDER, loud, loud, content)
@@ -197,10 +199,10 @@ def _reminded(
 
 
 def _cleared(glider: str, episode: Episode, calls: tuple[Call, ...]) -> tuple[Episode, list[Notice]]:
-    """The episode, and its all-clear once a later call tells of a mission; what was only noted needs none."""
+    """The episode, and its all-clear once a later call reports a mission; what was only noted needs none."""
     if episode.severity is Severity.INFO:
         return replace(episode, cleared=episode.time), []
-    since = max(episode.time, *(one.t for one in episode.told))
+    since = max(episode.time, *(one.t for one in episode.reports))
     call = next((c for c in calls if c.began > since and _is_in_mission(c)), None)
     if call is None:
         return episode, []

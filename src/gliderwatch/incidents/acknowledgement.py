@@ -1,4 +1,4 @@
-"""When somebody has acknowledged an incident, or muted a glider: what is brought to mind no more. Pure."""
+"""Acknowledged incidents and muted gliders: of what nobody is reminded. Pure."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gliderwatch.model import Incident, Kind, Severity
 from gliderwatch.params import Attention
 
 # ----------------------------------------
-# When somebody has taken an incident on: it is brought to mind no more, until it grows worse.
+# Of an acknowledged incident nobody is reminded, until it grows worse.
 
 MARGINS = {Kind.ANOMALY: WORSE_SPEED, Kind.FALSE_ALARM: WORSE_FLOW_ERROR}
 """How much further out of the ordinary than when it was acknowledged counts as worse: m/s out of the normal
@@ -20,9 +20,9 @@ range, or flow error p_E."""
 
 @dataclass(frozen=True, slots=True)
 class Ack:
-    """Who took an incident on, when (``at``, s), with what ``note``, and how bad it was then.
+    """Who acknowledged an incident, when (``at``, s), with what ``note``, and how bad it was then.
 
-    ``departure`` is that of its worst dive (`rules.incident.departure`), ``severe`` whether that was severe.
+    ``departure`` is that of its worst dive (`state_machine.departure`), ``severe`` whether that was severe.
     """
 
     incident: str
@@ -46,9 +46,11 @@ Acks = Mapping[str, Ack]
 """Acknowledgements by the id of their incident."""
 
 
-def is_taken_on(acks: Acks, ids: Iterable[str], severity: Severity) -> bool:
-    """Whether somebody has taken on what goes on under one of some ids and is of a severity; of what is no
-    incident of dives that alone says whether it has grown worse."""
+def is_acknowledged(acks: Acks, ids: Iterable[str], severity: Severity) -> bool:
+    """Whether somebody has acknowledged, at a severity or a higher one, what is not over under one of some
+    ids.
+
+    Of what is no incident of dives its severity alone says whether it has grown worse."""
     found = (ack for identity in ids if (ack := acks.get(identity)) is not None)
     return any(severity <= ack.severity for ack in found)
 
@@ -71,7 +73,8 @@ def acknowledge(incident: Incident, by: str, note: str, at: float) -> Ack:
 
 
 def with_mute(configured: Attention, until: float | None) -> Attention:
-    """How a glider is taken that a command mutes until a time (s; None: it does not): the later mute counts.
+    """The attention of a glider that a command mutes until a time (s; None: it does not): the later mute
+    counts.
 
     >>> with_mute(Attention(muted_until=5.0), 9.0).muted_until
     9.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from gliderwatch.incidents.aborts import NEWS
-from gliderwatch.incidents.acknowledgement import Acks, is_taken_on
+from gliderwatch.incidents.acknowledgement import Acks, is_acknowledged
 from gliderwatch.incidents.constants import LONGEST_CALL
 from gliderwatch.incidents.notices import CalledWithoutFile, Notice, SendsAgain
 from gliderwatch.incidents.overdue import HOUR, Sign
@@ -21,13 +21,13 @@ _PLACE = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
-class Empty:
-    """What people have been told of calls without a file: the first began at ``since`` (s); so many were
-    ``told`` in so many ``messages``; ``is_over`` once a file was sent again."""
+class CallsWithoutFile:
+    """The messages about calls without a file in a row: the first call began at ``since`` (s), so many were
+    ``reported`` in so many ``messages``; ``is_over`` once a file was sent again."""
 
     id: str
     since: float
-    told: int
+    reported: int
     messages: int
     is_over: bool = False
 
@@ -61,7 +61,7 @@ def _is_one(before: list[Call], call: Call) -> bool:
 @dataclass(frozen=True, slots=True)
 class Announced:
     """A file whose transfer began in a call: its 8.3 ``name``, and the full name of its ``segment`` (empty:
-    not told), lower case."""
+    not known), lower case."""
 
     name: str
     segment: str
@@ -87,16 +87,16 @@ def announced_flight(call: Call) -> tuple[Announced, ...]:
 
 def announce(
     glider: str,
-    before: Empty | None,
+    before: CallsWithoutFile | None,
     calls: tuple[Call, ...],
     signs: tuple[Sign, ...],
     now: float,
     acks: Acks = MappingProxyType({}),
-) -> tuple[Empty | None, list[Notice]]:
-    """What people have been told of calls without a file after the messages due `now` (s), and these.
+) -> tuple[CallsWithoutFile | None, list[Notice]]:
+    """What people were notified of after the messages about calls without a file due `now` (s), and these.
 
-    `calls` are those known of the last weeks, in order of time; `signs` tells of files that came otherwise.
-    What somebody has taken on (`acks`) is not repeated.
+    `calls` are those of the last weeks, in order of time; `signs` has the files that came another way.
+    What somebody has acknowledged (`acks`) is not repeated.
     """
     groups = surfacings(calls)
     over = [g for k, g in enumerate(groups) if k + 1 < len(groups) or _is_over(g, now)]
@@ -109,27 +109,29 @@ def announce(
     since, n = run[0][0].began, len(run)
     state = before
     if state is None or state.is_over:
-        taken = [] if state is None else [state.id]
-        state = Empty(thread_id(f"{glider}/call/{since:.0f}", taken), since, 0, 0)
-    is_due = n > state.told and (n <= SEVERAL or n >= 2 * state.told)
+        used = [] if state is None else [state.id]
+        state = CallsWithoutFile(thread_id(f"{glider}/call/{since:.0f}", used), since, 0, 0)
+    is_due = n > state.reported and (n <= SEVERAL or n >= 2 * state.reported)
     if not is_due or now - run[-1][-1].last_t >= NEWS:
         return before, []
     loud = Severity.INFO if n < SEVERAL else Severity.WARNING
-    if is_taken_on(acks, (state.id,), loud):
+    if is_acknowledged(acks, (state.id,), loud):
         return before, []
     content = CalledWithoutFile(tuple(group[-1] for group in run))
     identity, time = f"{state.id}/{state.messages}", content.calls[-1].last_t
     notice = Notice(identity, state.id, glider, time, Kind.CALL, loud, loud, content)
-    return replace(state, told=n, messages=state.messages + 1), [notice]
+    return replace(state, reported=n, messages=state.messages + 1), [notice]
 
 
-def _over(glider: str, before: Empty | None, groups: list[Surfacing]) -> tuple[Empty | None, list[Notice]]:
+def _over(
+    glider: str, before: CallsWithoutFile | None, groups: list[Surfacing]
+) -> tuple[CallsWithoutFile | None, list[Notice]]:
     """A file was sent again."""
     later = [] if before is None else [g for g in groups if g[0].began > before.since]
     if before is None or before.is_over or not later:
         return before, []
     ended = replace(before, is_over=True)
-    if before.told < SEVERAL:
+    if before.reported < SEVERAL:
         return ended, []
     identity, call = f"{before.id}/{before.messages}", later[-1][-1]
     info, to = Severity.INFO, Severity.WARNING
@@ -144,7 +146,7 @@ def _is_over(surfacing: Surfacing, now: float) -> bool:
 
 
 def _is_in_mission(surfacing: Surfacing) -> bool:
-    """Whether a mission runs, and nothing that is told as an abort (`incidents.aborts`) has happened."""
+    """Whether a mission runs, and nothing that is reported as an abort (`incidents.aborts`) has happened."""
     return any(call.mission for call in surfacing) and not any(call.happened for call in surfacing)
 
 

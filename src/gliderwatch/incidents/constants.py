@@ -14,11 +14,11 @@ WORSE_SPEED = 0.05
 WORSE_FLOW_ERROR = 0.1
 """Of the flow error p_E: the same for measurements that disagree."""
 
-# What is announced
+# What people are notified of
 NEWS = 86400.0
 """s: an incident that was over for longer when it became known is history, not news."""
 REGIME_DIVES = 8
-"""Dives back among which a new way of flying is looked for, one that people do not know: a day of 3 h."""
+"""Dives back among which a new way of flying is looked for that nobody was notified of: a day of 3 h."""
 TREND_DIVES = 5
 """Dives back whose speeds a message names: half a day to two days of flight."""
 NEIGHBOURS_IN_A_ROW = 2
@@ -27,12 +27,12 @@ NEIGHBOURS_AGAIN = 7 * 86400.0
 """s after which what the neighbours show is reported once more, if they show it: their currents of four days
 count."""
 SPEED_CHANGE = 0.05
-"""m/s: a smaller change of a speed that was announced is not worth a correction."""
+"""m/s: a smaller change of a speed that was reported is not worth a correction."""
 FLOW_CHANGE = 0.05
 """m/s, a component: the same for the reference flow."""
 MESSAGE_LATE = 900.0
-"""s: a message made later than that after its time speaks of now (the service was off), an earlier one of its
-time, so that live and replay say the same."""
+"""s: a message made later than that after its time is about now (the service was off), an earlier one about
+its time, so that live and replay send the same."""
 
 # When a glider is overdue
 LEAST_MARGIN = 3 * 3600.0
@@ -52,7 +52,7 @@ LOSSY = 3.0
 GUESSED_SIGMA = 0.5
 """Part of an interval guessed from files: the standard error of its end."""
 SAME_CALL = 0.25
-"""Part of an interval: what comes so soon after the call last heard belongs to it."""
+"""Part of an interval: what comes so soon after the last call belongs to it."""
 LATER_CALL = 0.5
 """Part of an interval: a sign of life later than this after a surfacing is of another call."""
 
@@ -90,7 +90,7 @@ SURELY = 2.0
 
 # Reminders of what is open
 MARKS = (1.0, 2.0, 4.0, 7.0)
-"""Days after which an open incident is brought to mind,"""
+"""Days after which people are reminded of an open incident,"""
 WEEK = 7.0
 """and then each time after so many days."""
 SLACK = 0.2

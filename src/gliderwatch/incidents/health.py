@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from gliderwatch.health.constants import REMEMBERED
 from gliderwatch.health.rule import Finding
 from gliderwatch.health.rules import RULES, Judged
-from gliderwatch.incidents.acknowledgement import Acks, is_taken_on
+from gliderwatch.incidents.acknowledgement import Acks, is_acknowledged
 from gliderwatch.incidents.constants import NEWS
 from gliderwatch.incidents.notices import (
     Content,
@@ -73,7 +73,7 @@ def _worse(before: HealthIncident, finding: Finding) -> HealthIncident:
 @dataclass(frozen=True, slots=True)
 class HealthThread:
     """The notices of one incident: it as ``reported``, so many ``messages``, and the time (s) of the latest
-    reading known at the last; ``is_over`` once that was reported too."""
+    reading at the last; ``is_over`` once that was reported too."""
 
     id: str
     reported: HealthIncident
@@ -102,8 +102,8 @@ def announce(
 ) -> tuple[tuple[HealthThread, ...], list[Notice]]:
     """What people have been notified of after the notices that are due, and these.
 
-    `rows` is what the rules found in the segments and calls known, in order of time (s); `fix` the glider's
-    last. Of what somebody has taken on (`acks`) nobody is reminded, unless it has grown worse.
+    `rows` is what the rules found in the segments and calls, in order of time (s); `fix` the glider's
+    last. Of what somebody has acknowledged (`acks`) nobody is reminded, unless it has grown worse.
     """
     if not rows:
         return before, []
@@ -115,12 +115,12 @@ def announce(
         after, more = _continued(thread, matched.get(thread.id), now)
         threads.append(after)
         notices += more
-    old, taken = {i.id for i in matched.values()}, {t.id for t in threads}
+    old, used = {i.id for i in matched.values()}, {t.id for t in threads}
     for incident in incidents:
         is_news = incident.cleared_at is None or now.latest - incident.cleared_at < NEWS
         if incident.id not in old and is_news:
-            identity = thread_id(incident.id, taken)
-            taken.add(identity)
+            identity = thread_id(incident.id, used)
+            used.add(identity)
             thread = HealthThread(identity, incident, 0, now.latest)
             thread, more = _notified(thread, incident, HealthFound(incident, False, fix), now)
             notices += more
@@ -156,7 +156,7 @@ def _overlaps(now: HealthIncident, reported: HealthIncident) -> bool:
 def _continued(
     thread: HealthThread, incident: HealthIncident | None, now: _Now
 ) -> tuple[HealthThread, list[Notice]]:
-    """A thread after what is known now, and the notice that is due."""
+    """A thread after what is so now, and the notice that is due."""
     if incident is None or incident.cleared_at is not None:
         if thread.is_over:
             return thread, []
@@ -167,7 +167,7 @@ def _continued(
     if thread.is_over or incident.severity > thread.reported.severity:
         thread, notices = _notified(thread, incident, HealthFound(incident, not thread.is_over, now.fix), now)
         return replace(thread, is_over=False), notices
-    is_wanted = not is_taken_on(now.acks, (incident.id, thread.id), incident.severity)
+    is_wanted = not is_acknowledged(now.acks, (incident.id, thread.id), incident.severity)
     if is_wanted and is_reminder_due(incident.opened_at, thread.time, now.latest, now.reminder_hours):
         reminder = HealthReminder(incident, (now.latest - incident.since) / 3600, now.fix)
         return _notified(thread, incident, reminder, now)
@@ -194,5 +194,5 @@ def _notified(
         worst,
         content,
     )
-    told = HealthThread(thread.id, incident, thread.messages + 1, now.latest, thread.is_over)
-    return told, [notice]
+    after = HealthThread(thread.id, incident, thread.messages + 1, now.latest, thread.is_over)
+    return after, [notice]

@@ -89,7 +89,7 @@ class Corrected:
 
 @dataclass(frozen=True, slots=True)
 class Acknowledged:
-    """Somebody (``by``) has taken on what goes on in a ``thread`` of a ``kind`` since ``since`` (s),
+    """Somebody (``by``) has acknowledged what is open in a ``thread`` of a ``kind`` since ``since`` (s),
     with a ``note``; ``is_undone``: has given it back."""
 
     thread: str
@@ -166,15 +166,15 @@ class Fleet:
 class Absence:
     """A glider that stays away, as known at ``now`` (s).
 
-    ``heard`` is its last sign of life and ``awaited`` the call that did not come (s); ``lat`` and ``lon``
-    (degrees) where that was expected. ``last`` is the last dive that ended, ``flow`` the last known current
-    (east, north; m/s), ``incidents`` what was open.
+    ``last_sign`` is its last sign of life and ``expected_at`` the time of the call that did not come (s);
+    ``lat`` and ``lon`` (degrees) where that was expected. ``last`` is the last dive that ended, ``flow`` the
+    last known current (east, north; m/s), ``incidents`` what was open.
     """
 
     glider: str
     now: float
-    heard: float
-    awaited: float
+    last_sign: float
+    expected_at: float
     lat: float | None
     lon: float | None
     area: DriftEllipse | None
@@ -194,10 +194,10 @@ class Overdue:
 
 @dataclass(frozen=True, slots=True)
 class CalledAgain:
-    """The first sign of life, ``at`` (s), since the glider was ``heard`` (s); ``last`` is its last dive that
+    """The first sign of life, ``at`` (s), since the ``last_sign`` before (s); ``last`` is its last dive that
     ended. ``for_all``: the notice that it stayed away stood for all gliders, because none called."""
 
-    heard: float
+    last_sign: float
     at: float
     last: Assessment | None
     for_all: bool
@@ -216,7 +216,7 @@ class CalledInTime:
 
 @dataclass(frozen=True, slots=True)
 class Unjudged:
-    """What should have led to a judgement and did not: a dive without a flag, or a file that was not taken.
+    """What should have led to a judgement and did not: a dive without a flag, or a file that was not decoded.
 
     ``start`` and ``end`` (s); ``cause`` for decisions (None: the estimator's own, as in ``words``) and in
     ``words``; ``crc`` of the cache file that is missing.
@@ -230,7 +230,7 @@ class Unjudged:
 
     @property
     def is_file(self) -> bool:
-        """Whether it is a file that was not taken."""
+        """Whether it is a file that was not decoded."""
         return isinstance(self.cause, Hindrance)
 
 
@@ -356,7 +356,7 @@ class HealthFound:
 
 @dataclass(frozen=True, slots=True)
 class HealthReminder:
-    """What a rule found is so for so many ``hours``, and nobody has taken it on."""
+    """What a rule found is so for so many ``hours``, and nobody has acknowledged it."""
 
     incident: HealthIncident
     hours: float

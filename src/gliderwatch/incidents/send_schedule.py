@@ -1,4 +1,4 @@
-"""When a message goes out: quiet hours, and people who are told only what nobody has taken on. Pure."""
+"""When a message goes out: quiet hours, and people who get only what nobody has acknowledged. Pure."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class QuietHours:
     def until(self, t: float) -> float:
         """Their end, where a time (s) lies in them, else the time itself.
 
-        An end that the clock leaves out when it is put forward is taken by the offset before, as RFC 5545
+        An end that the clock leaves out when it is put forward has the offset before, as RFC 5545
         (3.3.5) does. Of one that comes twice it is the first that is still to come.
         """
         if not self.holds(t):
@@ -47,8 +47,8 @@ class QuietHours:
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """What one recipient waits for: they hear of an incident ``after`` a time (s) without acknowledgement
-    (None: at once), and not in their ``quiet`` hours."""
+    """What one recipient waits for: they are notified of an incident ``after`` a time (s) without
+    acknowledgement (None: at once), and not in their ``quiet`` hours."""
 
     after: float | None = None
     quiet: QuietHours | None = None
@@ -64,16 +64,16 @@ AT_ONCE = (Wait(),)
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """How an incident stands with a channel: whether the channel has ``told`` of it, whether it is
-    ``unanswered`` (it goes on, and nobody has taken it on), and when that what waits there ``escalates`` (s;
-    infinite: nothing waits)."""
+    """How an incident stands with a channel: whether people were ``notified`` of it there, whether it is
+    ``unanswered`` (it is open, and nobody has acknowledged it), and when that what waits there ``escalates``
+    (s; infinite: nothing waits)."""
 
-    told: bool
+    notified: bool
     unanswered: bool
     escalates: float = inf
 
 
-NO_INCIDENT = Standing(told=True, unanswered=False)
+NO_INCIDENT = Standing(notified=True, unanswered=False)
 """For messages that nobody can acknowledge."""
 
 
@@ -89,12 +89,12 @@ class Due:
 def due(waits: Iterable[Wait], severity: Severity, now: float, standing: Standing) -> Due | None:
     """When a message made `now` (s) goes out by a channel whose recipients wait so; None: it does not.
 
-    The one of them who waits least decides. Whoever waits for an acknowledgement hears of an incident from
-    when they were first told of it on, or not at all.
+    The one of them who waits least decides. Whoever waits for an acknowledgement gets the messages of an
+    incident from their first one on, or none.
     """
     at = escalates = inf
     for wait in waits:
-        if wait.after is None or standing.told:
+        if wait.after is None or standing.notified:
             at = min(at, wait.until(now, severity))
         elif standing.unanswered:
             begins = now + wait.after if standing.escalates == inf else standing.escalates
@@ -109,7 +109,7 @@ def deliveries(
 ) -> dict[str, Due]:
     """When a message made `now` (s) goes out by each of its channels; one by which it does not is left out.
 
-    A mapping of `channels` tells what the recipients of each wait for; of names alone they get it at once.
+    A mapping of `channels` says what the recipients of each wait for; of names alone they get it at once.
     `standing` is how its incident stands with a channel, asked only where somebody waits for that.
     """
     waits = channels if isinstance(channels, Mapping) else dict.fromkeys(channels, AT_ONCE)
@@ -123,8 +123,8 @@ def deliveries(
 
 
 def is_reminder_due(opened: float, last: float, now: float, hours: float | None) -> bool:
-    """Whether what is so since a time (s) and was ``last`` brought to mind is to be now; ``hours`` are what
-    is set in place of a day, None: never."""
+    """Whether what is so since a time (s) and had its ``last`` message is due for a reminder; ``hours`` are
+    what is set in place of a day, None: never."""
     if hours is None:
         return False
     before, age = ((t - opened) / 3600 / hours for t in (last, now))
@@ -132,8 +132,8 @@ def is_reminder_due(opened: float, last: float, now: float, hours: float | None)
 
 
 def next_reminder(age: float) -> float:
-    """The age (days, or what is set in their place) at which an incident is brought to mind that was last
-    told of at an ``age``: at 1, 2, 4 and 7 days, then each week, and never within a day of that.
+    """The age (days, or what is set in their place) of the next reminder of an incident whose last
+    message was at an ``age``: at 1, 2, 4 and 7 days, then each week, and never within a day of that.
 
     >>> [next_reminder(age) for age in (0.0, 0.5, 1.0, 2.1, 4.2, 7.0)]
     [1.0, 2.0, 2.0, 4.0, 7.0, 14.0]

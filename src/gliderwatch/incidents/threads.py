@@ -15,13 +15,14 @@ class _Named(Protocol):
 Incident = TypeVar("Incident", bound=_Named)
 
 
-def thread_id(identity: str, taken: Iterable[str]) -> str:
-    """The id of a new thread: ``identity``, with one plus more than the last of these that is ``taken``.
+def thread_id(identity: str, used: Iterable[str]) -> str:
+    """The id of a new thread: ``identity``, with one plus more than the last of these that is ``used``
+    already.
 
     >>> thread_id("a/abort/5", ["b/abort/5"]), thread_id("a/abort/5", ["a/abort/5", "a/abort/5+"])
     ('a/abort/5', 'a/abort/5++')
     """
-    same = [each for each in taken if each.rstrip("+") == identity]
+    same = [each for each in used if each.rstrip("+") == identity]
     return max(same, key=len) + "+" if same else identity
 
 

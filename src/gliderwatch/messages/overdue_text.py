@@ -28,9 +28,9 @@ _ROUND = 0.9
 def overdue(glider: str, content: Overdue) -> Text:
     """The glider is overdue, or still is."""
     a = content.absence
-    late, silent = duration(a.now - a.awaited), duration(a.now - a.heard)
+    late, silent = duration(a.now - a.expected_at), duration(a.now - a.last_sign)
     still = "" if content.first else "still "
-    first = f"{name_of(glider)} is {still}overdue by {late}: its call of {utc(a.awaited)} did not come, "
+    first = f"{name_of(glider)} is {still}overdue by {late}: its call of {utc(a.expected_at)} did not come, "
     first += f"silent for {silent}. {_side(a.fleet)}"
     trouble, harmless = _weighed(a)
     lists = (("For trouble of the glider", trouble), ("Against", harmless))
@@ -47,12 +47,12 @@ def overdue(glider: str, content: Overdue) -> Text:
 
 def called_again(glider: str, content: CalledAgain) -> Text:
     """The glider gave a sign of life."""
-    silent = duration(content.at - content.heard)
+    silent = duration(content.at - content.last_sign)
     first = f"{name_of(glider)} calls again: {utc(content.at)}, after {silent} of silence. "
     first += "It is not overdue any more."
     page = Page(
         (first, where(content.last), *((_EACH,) if content.for_all else ())),
-        (("Silent", f"{utc(content.heard)} to {utc(content.at)}"), *_last(content.last)),
+        (("Silent", f"{utc(content.last_sign)} to {utc(content.at)}"), *_last(content.last)),
         do=("Nothing; its dives are judged as its files come.",),
     )
     return titled(glider, f"ALL CLEAR: calls again after {silent}"), page
@@ -103,8 +103,8 @@ def _numbers(a: Absence) -> tuple[tuple[str, str], ...]:
     there = "" if spot == UNKNOWN else f" at {spot}"
     area = () if a.area is None else (("Search here", place(a.area.lat, a.area.lon)),)
     return (
-        ("Silent since", utc(a.heard)),
-        ("Expected", f"{utc(a.awaited)}{there}"),
+        ("Silent since", utc(a.last_sign)),
+        ("Expected", f"{utc(a.expected_at)}{there}"),
         *_last(a.last),
         *area,
     )

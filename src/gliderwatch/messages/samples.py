@@ -165,8 +165,8 @@ def _overdue(now: float) -> Alert:
     absence = Absence(
         glider=GLIDER,
         now=now,
-        heard=last.t_surface,
-        awaited=expected,
+        last_sign=last.t_surface,
+        expected_at=expected,
         lat=24.21,
         lon=-83.01,
         area=DriftEllipse(24.24, -82.99, 9200.0, 6100.0, 48.0),

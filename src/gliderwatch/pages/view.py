@@ -52,7 +52,7 @@ class GliderView:
     def heard(self) -> float | None:
         """Its last sign of life (s)."""
         times = [call.last_t for call in self.calls if call.last_t <= self.now]
-        times += [self.awaited.heard] if self.awaited is not None else []
+        times += [self.awaited.last_sign] if self.awaited is not None else []
         times += [self.latest.t_surface] if self.latest is not None else []
         return max(times, default=None)
 
@@ -115,12 +115,12 @@ def _verdicts(view: GliderView) -> Iterator[Verdict]:
         )
     for episode in view.said.aborts:
         if episode.cleared is None:
-            cause = next((clean(t.cause, 40) for t in episode.told if t.cause), "")
+            cause = next((clean(t.cause, 40) for t in episode.reports if t.cause), "")
             sentence = f"It fell out of its mission{f': {cause}' if cause else ''}."
-            yield Verdict(0, "bad", "ABORTED", sentence, episode.told[0].t)
+            yield Verdict(0, "bad", "ABORTED", sentence, episode.reports[0].t)
     if view.is_overdue and (call := view.awaited) is not None:
-        sentence = f"Expected {utc(call.t)}, silent for {duration(view.now - call.heard)}."
-        yield Verdict(1, "bad", "OVERDUE", sentence, call.heard)
+        sentence = f"Expected {utc(call.t)}, silent for {duration(view.now - call.last_sign)}."
+        yield Verdict(1, "bad", "OVERDUE", sentence, call.last_sign)
     for incident in view.open:
         yield _of_incident(incident)
     if view.said.empty is not None and not view.said.empty.is_over:

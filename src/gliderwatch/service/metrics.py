@@ -152,7 +152,7 @@ def _is_overdue(store: Store, config: Config, glider: str, now: float) -> bool:
     if expected is None or settings.recovered:
         return False
     call = expected_call(expected, known.signs(now - RECENT), now, config.attention(glider).overdue_hours)
-    return call.due <= now and now - call.heard < GONE
+    return call.due <= now and now - call.last_sign < GONE
 
 
 class Outbox:

@@ -253,7 +253,7 @@ def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: 
 def _due_of_calls(
     notified: NotificationState, facts: GliderFacts, acks: Acks, reminder_hours: float | None, now: float
 ) -> tuple[NotificationState, list[Notice]]:
-    """What is to be said of what a glider told in its calls."""
+    """The notices that are due of what a glider reported in its calls."""
     calls = facts.calls(now - GONE)
     episodes, notices = aborts.announce(facts.glider, notified.aborts, calls, now, acks, reminder_hours)
     signs = facts.signs(now - GONE) if calls else ()
@@ -264,9 +264,9 @@ def _due_of_calls(
 def _compare(
     store: Store, notified: NotificationState, last: Assessment | None, params: GliderParams, wanted: bool
 ) -> tuple[NotificationState, list[Notice]]:
-    """What is to be said of a glider beside its neighbours, where that is wanted: once for each surfacing,
-    by what was measured until then. Only a glider that is compared with its own currents (`reference: dac`)
-    has them in its assessments.
+    """The notices that are due of a glider beside its neighbours, where that is wanted: once for each
+    surfacing, by what was measured until then. Only a glider that is compared with its own currents
+    (`reference: dac`) has them in its assessments.
     """
     before = notified.neighbours
     if not wanted or last is None or params.reference != "dac":
@@ -300,7 +300,7 @@ def _due_messages(
     before, facts = store.notified(glider), store.facts(glider)
     last = facts.last_surfacing(inf)
     advice = store.fields.advice(glider, last.t_surface) if last is not None else []
-    silences, heard = overdue.on_calls(before.silences, facts, now)
+    silences, of_silences = overdue.on_calls(before.silences, facts, now)
     notified, of_incidents = due_notifications(
         replace(before, silences=silences),
         facts,
@@ -319,7 +319,7 @@ def _due_messages(
     rows, fix = store.health.judged(glider), facts.last_fix(now - GONE)
     threads, of_health = health.announce(notified.health, glider, rows, fix, acks, reminder_hours)
     notified = replace(notified, health=threads)
-    due = (*heard, *of_files, *of_incidents, *of_watch, *of_fleet, *of_calls, *of_health)
+    due = (*of_silences, *of_files, *of_incidents, *of_watch, *of_fleet, *of_calls, *of_health)
     alerts = tuple(map(render, due))
     if notified != before or alerts:
         post_alerts(store, glider, notified, alerts, _channels(store, before.silences, routing), now)

@@ -134,7 +134,23 @@ CONVERTERS: Mapping[type, tuple[Converter, ...]] = {
 """For each kind of record the way from layout 1 to today's: the n-th leads from layout n to n + 1. What is in
 it stays in it, for records of every layout are in use somewhere."""
 
-ROW_CONVERTERS: Mapping[str, Converter] = {}
+
+def said_of_schema_10(said: Any) -> Any:
+    """Schema 10 to 11: what people were notified of is called what it is."""
+    for thread in said.get("threads", ()):
+        moved(thread, "told", "reported")
+    for silence in said.get("silences", ()):
+        moved(silence, "awaited", "missed")
+        moved(silence, "missed.heard", "missed.last_sign")
+        moved(silence, "told", "stages")
+    for episode in said.get("aborts", ()):
+        moved(episode, "told", "reports")
+    if said.get("empty") is not None:
+        moved(said, "empty.told", "empty.reported")
+    return said
+
+
+ROW_CONVERTERS: Mapping[str, Converter] = {"said_of_schema_10": said_of_schema_10}
 """By name: functions that a migration in `database.MIGRATIONS` may call on the JSON text of a row, as
 ``UPDATE said SET data = said_of_schema_7(data)``. Rows have no version of their own: their table has."""
 

@@ -125,7 +125,7 @@ __all__ = [
     "schema",
 ]
 
-SCHEMA = 10
+SCHEMA = 11
 DELIVERY_BY_WORDS = """CASE
     WHEN delivered_at IS NULL THEN 'pending' WHEN error = '' THEN 'delivered'
     WHEN error LIKE 'withdrawn: %' THEN 'withdrawn' WHEN error LIKE 'given up: %' THEN 'unreadable'
@@ -303,6 +303,9 @@ CREATE TABLE health (             -- readings of each segment and call, and what
 ) STRICT;
 CREATE INDEX health_in_order ON health (glider, t);
 CREATE INDEX health_to_judge ON health (glider, t) WHERE judged IS NULL;
+""",
+    11: """
+UPDATE said SET data = said_of_schema_10(data);
 """,
 }
 """SQL that leads from the schema before to the one of the key. It may call the functions of

@@ -9,7 +9,7 @@ from pathlib import Path
 from gliderwatch.incidents.acknowledgement import Ack, Acks
 from gliderwatch.incidents.calls import announced_flight
 from gliderwatch.incidents.constants import GONE, UNTIL_COME
-from gliderwatch.incidents.irregularities import PLACES, Coming, found
+from gliderwatch.incidents.irregularities import PLACES, Arrival, irregularities
 from gliderwatch.incidents.notices import Irregularity, Unjudged
 from gliderwatch.incidents.overdue import Sign
 from gliderwatch.model import (
@@ -43,7 +43,7 @@ class Annotations:
         return None if row is None else float(row[0])
 
     def mute(self, glider: str, until: float, now: float) -> None:
-        """Tell nothing of a glider until a time (s), in place of what was noted before."""
+        """Send nothing of a glider until a time (s), in place of an earlier mute."""
         self._db.execute("INSERT OR REPLACE INTO mutes VALUES (?, ?, ?)", (glider, until, now))
 
     def unmute(self, glider: str, now: float) -> None:
@@ -83,7 +83,7 @@ class Annotations:
 
 
 class GliderFacts:
-    """What `rules` asks of one glider (each `Known` there), on the connection of its store."""
+    """What the rules ask of one glider (`incidents.facts.Facts`), on the connection of its store."""
 
     def __init__(self, connection: sqlite3.Connection, glider: str) -> None:
         self._db, self.glider = connection, glider
@@ -193,7 +193,7 @@ class GliderFacts:
     def irregularities(self, now: float) -> list[Irregularity]:
         """What is wrong with its files, as known at `now` (s)."""
         steps = segments.steps(self._db, self.glider)
-        return found(self.glider, steps, self.places(PLACES), self.comings(now - GONE, now))
+        return irregularities(self.glider, steps, self.places(PLACES), self.arrivals(now - GONE, now))
 
     def places(self, n: int) -> list[Fix]:
         """Where and when it surfaced the last `n` times that are known, in order of time."""
@@ -204,14 +204,14 @@ class GliderFacts:
         rows = self._db.execute(sql, (self.glider, n)).fetchall()
         return [Fix(*row) for row in reversed(rows) if row[1] is not None and row[2] is not None]
 
-    def comings(self, since: float, until: float) -> list[Coming]:
+    def arrivals(self, since: float, until: float) -> list[Arrival]:
         """Its segments of which the first file came between two times (s), in that order."""
         sql = (
             "SELECT segment, coalesce(last_t, opened_at), at, "
             "(SELECT min(at) FROM heard WHERE glider = ?1) "
             "FROM heard WHERE glider = ?1 AND at BETWEEN ?2 AND ?3 ORDER BY at"
         )
-        return [Coming(*row) for row in self._db.execute(sql, (self.glider, since, until))]
+        return [Arrival(*row) for row in self._db.execute(sql, (self.glider, since, until))]
 
     def signs(self, since: float) -> tuple[Sign, ...]:
         """Its files that were opened at `since` (s) or later, or that came since, and its calls."""

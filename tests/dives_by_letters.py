@@ -1,4 +1,5 @@
-"""A glider's dives by letters, and what is to be said of them: for tests of `incidents.notifications`."""
+"""A glider's dives by letters, and the messages that are due of them: for tests of
+`incidents.notifications`."""
 
 from __future__ import annotations
 
@@ -27,7 +28,7 @@ def dive(k: int, letter: str, **changes: object) -> Assessment:
 
 @dataclass
 class World:
-    """What is known of one glider: `rules.announce.Known` over a dictionary of dives."""
+    """The facts of one glider: `incidents.notifications.IncidentFacts` over a dictionary of dives."""
 
     dives: dict[float, Assessment]
     rules: RuleParams = RuleParams()
@@ -35,7 +36,7 @@ class World:
 
     @classmethod
     def of(cls, letters: str, rules: RuleParams | None = None) -> World:
-        """The dives of some letters; a space is a dive that is not known."""
+        """The dives of some letters; a space is a dive that has not come."""
         made = [dive(k, letter) for k, letter in enumerate(letters) if letter != " "]
         return cls({a.t_dive: a for a in made}, rules or RuleParams())
 
@@ -43,8 +44,8 @@ class World:
         """As the rules find them in all dives in order."""
         state, found = RuleStates(), {}
         for t in sorted(self.dives):
-            state, told = advance(state, self.dives[t], self.rules)
-            found |= {i.id: i for i in told}
+            state, changed = advance(state, self.dives[t], self.rules)
+            found |= {i.id: i for i in changed}
         return tuple(sorted(found.values(), key=lambda i: (i.opened_at, i.id)))
 
     def dive(self, t_dive: float) -> Assessment | None:
@@ -62,15 +63,15 @@ class World:
 
 
 class Talk:
-    """All that is said while a world becomes known."""
+    """All messages while the dives of a world come in."""
 
     def __init__(self, reminder_hours: float | None = 24.0, notices: bool = False) -> None:
-        self.said, self.alerts = NotificationState(), list[Alert]()
+        self.notified, self.alerts = NotificationState(), list[Alert]()
         self.reminder_hours, self.notices = reminder_hours, notices
 
-    def hear(self, world: World | str) -> list[str]:
+    def update(self, world: World | str) -> list[str]:
         """The kinds of the messages that a world leads to now."""
-        known = World.of(world) if isinstance(world, str) else world
-        self.said, new = due_notifications(self.said, known, self.reminder_hours, self.notices)
+        now = World.of(world) if isinstance(world, str) else world
+        self.notified, new = due_notifications(self.notified, now, self.reminder_hours, self.notices)
         self.alerts += map(render, new)
         return [str(a.kind) for a in new]

@@ -5,14 +5,13 @@ from dataclasses import replace
 import pytest
 
 from alert_support import DISAGREE, SLOW, incident
-from announcing import Talk as Announcer
-from announcing import World, dive
+from dives_by_letters import Talk as Announcer
+from dives_by_letters import World, dive
 from gliderwatch.incidents.acknowledgement import acknowledge
 from gliderwatch.incidents.notices import Unjudged
 from gliderwatch.incidents.overdue import (
     ExpectedCall,
     Sign,
-    drift,
     expected_call,
     first_call,
     guess,
@@ -23,6 +22,7 @@ from gliderwatch.incidents.overdue import (
 )
 from gliderwatch.incidents.state_machine import is_severe
 from gliderwatch.incidents.unjudged import blindness
+from gliderwatch.incidents.whereabouts import drift
 from gliderwatch.model import Kind, NextSurfacing, Unusable
 from gliderwatch.params import Attention
 from silent import DAY, HOUR, INTERVAL, MARGIN, T0, Clock, Sea, expected

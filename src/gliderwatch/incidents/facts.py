@@ -1,4 +1,4 @@
-"""How it stands with a glider now, beside what a message is about. Pure."""
+"""What the rules ask of one glider, and how it stands with it beside what a message is about. Pure."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from gliderwatch.incidents.notices import Situation
 from gliderwatch.model import Assessment, Incident, NextSurfacing
 
 
-class SituationFacts(Protocol):
-    """What is known of one glider now; the store answers."""
+class Facts(Protocol):
+    """The facts of one glider now; the store answers. What a rule asks beside these stands in that rule."""
 
     def incidents(self) -> tuple[Incident, ...]:
         """All its incidents."""
@@ -23,19 +23,19 @@ class SituationFacts(Protocol):
         """The last dive that has ended with a fix and surfaced at `until` (s) or before."""
 
 
-def situation(known: SituationFacts, incident: str = "") -> Situation:
+def situation(facts: Facts, incident: str = "") -> Situation:
     """The last dives, the next surfacing, and the open incidents but the one of an id."""
-    latest = dive = known.last_surfacing(math.inf)
+    latest = dive = facts.last_surfacing(math.inf)
     speeds: list[float | None] = []
     while dive is not None and len(speeds) < TREND_DIVES:
         speeds.insert(0, dive.speed)
-        dive = known.last_surfacing(dive.t_surface - 1.0)
-    others = tuple(i for i in known.incidents() if i.id != incident and i.cleared_at is None)
-    expected = None if latest is None else next_surfacing(known, latest)
+        dive = facts.last_surfacing(dive.t_surface - 1.0)
+    others = tuple(i for i in facts.incidents() if i.id != incident and i.cleared_at is None)
+    expected = None if latest is None else next_surfacing(facts, latest)
     return Situation(latest, tuple(speeds), expected, others)
 
 
-def next_surfacing(known: SituationFacts, latest: Assessment) -> NextSurfacing | None:
+def next_surfacing(facts: Facts, latest: Assessment) -> NextSurfacing | None:
     """The surfacing that is expected after the last one; None where that dive cannot be used."""
-    expected = known.expected(math.inf)
+    expected = facts.expected(math.inf)
     return None if expected is None or expected.after < latest.t_surface else expected

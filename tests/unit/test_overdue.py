@@ -13,7 +13,6 @@ from gliderwatch.incidents.overdue import (
     GONE,
     ExpectedCall,
     Sign,
-    drift,
     expected_call,
     first_call,
     fleet,
@@ -21,6 +20,7 @@ from gliderwatch.incidents.overdue import (
     is_at_sea,
     margin,
 )
+from gliderwatch.incidents.whereabouts import drift
 from gliderwatch.model import Severity
 from gliderwatch.navigation.geodesy import to_plane
 from silent import CALL, DAY, HOUR, INTERVAL, MARGIN, T0, Clock, Sea, expected
@@ -52,18 +52,18 @@ class TestMargin:
 
 class TestSignOfLife:
     def test_a_whole_file_is_as_old_as_its_last_sample(self):
-        assert Sign(0.0, 11000.0, 99999.0).time(INTERVAL) == 11000.0
+        assert Sign(0.0, 11000.0, 99999.0).sent_at(INTERVAL) == 11000.0
 
     def test_a_file_that_is_not_read_was_sent_an_interval_after_its_opening(self):
-        assert Sign(0.0, None, 99999.0).time(INTERVAL) == INTERVAL
+        assert Sign(0.0, None, 99999.0).sent_at(INTERVAL) == INTERVAL
 
     def test_so_was_one_that_breaks_off(self):
-        assert Sign(0.0, 60.0, 99999.0).time(INTERVAL) == INTERVAL
+        assert Sign(0.0, 60.0, 99999.0).sent_at(INTERVAL) == INTERVAL
 
     @pytest.mark.parametrize("last_t", [None, 60.0, 1e12])
     def test_never_after_it_came(self, last_t):
         """Also if the glider's clock is years ahead."""
-        assert Sign(0.0, last_t, 500.0).time(INTERVAL) == 500.0
+        assert Sign(0.0, last_t, 500.0).sent_at(INTERVAL) == 500.0
 
 
 class TestAwaited:
@@ -72,23 +72,23 @@ class TestAwaited:
 
     def test_the_end_of_the_last_call_does_not_put_the_next_off(self):
         call = expected_call(expected(), [Sign(T0 - INTERVAL, T0 + CALL, T0 + CALL)], DUE, None)
-        assert (call.heard, call.due) == (T0 + CALL, DUE)
+        assert (call.last_sign, call.due) == (T0 + CALL, DUE)
 
     def test_a_file_that_waits_for_its_cache_does(self):
         call = expected_call(expected(), [Sign(T0 + CALL, None, DUE - 1)], DUE, None)
-        assert call.heard == T0 + CALL + INTERVAL and call.due == DUE + CALL + INTERVAL
+        assert call.last_sign == T0 + CALL + INTERVAL and call.due == DUE + CALL + INTERVAL
 
     def test_a_file_of_later_is_not_known_yet(self):
         call = expected_call(
             expected(), [Sign(T0 + 4 * HOUR, T0 + 7 * HOUR, T0 + 7 * HOUR)], T0 + 5 * HOUR, None
         )
-        assert call.heard == T0
+        assert call.last_sign == T0
 
     def test_old_files_that_come_late_are_no_sign_of_life(self):
         call = expected_call(
             expected(), [Sign(T0 - 5 * DAY, None, DUE), Sign(T0 - DAY, T0 - DAY, DUE)], DUE, None
         )
-        assert (call.heard, call.due) == (T0, DUE)
+        assert (call.last_sign, call.due) == (T0, DUE)
 
     def test_it_becomes_overdue_at_growing_intervals(self):
         call = ExpectedCall(T0, T0, T0 + 10, INTERVAL)
@@ -268,7 +268,11 @@ class TestSilence:
         assert clock.at(T0 + 14 * HOUR) == ["all_clear"]
         assert clock.at(T0 + 14 * HOUR) == []
         told = clock.alerts[-1]
-        assert (told.time, told.severity, told.audience) == (T0 + 13 * HOUR, Severity.INFO, Severity.CRITICAL)
+        assert (told.time, told.severity, told.audience) == (
+            T0 + 13 * HOUR,
+            Severity.INFO,
+            Severity.CRITICAL,
+        )
         assert "after 12.8 h" in told.title and told.incident == clock.alerts[0].incident
 
     def test_who_only_got_the_warning_gets_the_end(self):

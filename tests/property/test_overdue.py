@@ -61,6 +61,6 @@ def test_files_in_any_order_at_any_time(hours, data):
     assert len(set(ends)) == len(ends)
     calls = [T0 - INTERVAL, *times]
     for silence in clock.silences:
-        call = silence.awaited
-        in_time = [t for t in calls if call.heard < t <= call.due]
+        call = silence.missed
+        in_time = [t for t in calls if call.last_sign < t <= call.due]
         assert silence.withdrawn == bool(in_time) or silence.called is None

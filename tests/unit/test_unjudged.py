@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from gliderwatch.incidents.notices import Unjudged
 from gliderwatch.incidents.notifications import NotificationState, unacknowledged
 from gliderwatch.incidents.overdue import Sign
-from gliderwatch.incidents.unjudged import Unknown, announce, blindness
+from gliderwatch.incidents.unjudged import UnjudgedThread, announce, blindness
 from gliderwatch.messages.notice_text import render
 from gliderwatch.messages.template import escalated
 from gliderwatch.messages.unjudged_text import CURES
@@ -74,12 +74,12 @@ class Talk:
 
     def __init__(self, sea: Sea, attention: Attention = USUAL) -> None:
         self.sea, self.attention = sea, attention
-        self.said: Unknown | None = None
+        self.notified: UnjudgedThread | None = None
         self.alerts: list[Alert] = []
 
-    def hear(self, k: int, *cause: Unusable | Hindrance | str | None) -> list[Kind]:
+    def update(self, k: int, *cause: Unusable | Hindrance | str | None) -> list[Kind]:
         self.sea.dive(k, *cause)  # type: ignore[arg-type]
-        self.said, new = announce(self.said, self.sea, self.attention, 24.0, now(k))
+        self.notified, new = announce(self.notified, self.sea, self.attention, 24.0, now(k))
         self.alerts += map(render, new)
         return [a.kind for a in new]
 
@@ -88,14 +88,14 @@ class Talk:
 def test_each_cause_is_told_with_its_cure_once_and_clears(cause: Unusable | Hindrance) -> None:
     talk = Talk(Sea())
     for k in range(10):
-        talk.hear(k, *((cause, "so it is") if k >= 3 else ()))
+        talk.update(k, *((cause, "so it is") if k >= 3 else ()))
     (alert,) = talk.alerts
     assert alert.kind is Kind.UNKNOWN
     assert alert.severity == alert.audience == Severity.WARNING
     assert "CANNOT BE JUDGED" in alert.title and "so it is. " in alert.body
     assert "Main reason: 7 " in alert.body
     assert CURES[cause].format(cache="ab.cac")[1:] in alert.body
-    assert talk.hear(10) == [Kind.ALL_CLEAR] and talk.hear(11) == []
+    assert talk.update(10) == [Kind.ALL_CLEAR] and talk.update(11) == []
     assert talk.alerts[-1].incident == alert.incident and talk.alerts[-1].audience == Severity.WARNING
     assert {a.id for a in talk.alerts} == {f"{alert.incident}/0", f"{alert.incident}/1"}
 
@@ -108,7 +108,7 @@ def test_every_cause_that_can_hold_for_long_has_a_cure() -> None:
 def test_the_most_frequent_reason_comes_first() -> None:
     talk = Talk(Sea())
     for k in range(7):
-        talk.hear(
+        talk.update(
             k, *((Unusable.NO_HEADING, "no heading") if k % 3 == 0 else (Hindrance.NO_CACHE, "no cache"))
         )
     body = talk.alerts[0].body
@@ -119,8 +119,8 @@ def test_the_most_frequent_reason_comes_first() -> None:
 @pytest.mark.parametrize(("dives", "hours", "n"), [(8, None, 8), (3, 24.0, 3), (None, 12.0, 4), (8, 12.0, 4)])
 def test_by_dives_or_hours_whichever_is_first(dives: int | None, hours: float | None, n: int) -> None:
     talk = Talk(Sea(interval=HOUR), Attention(unknown_hours=hours, unknown_dives=dives))
-    said = [bool(talk.hear(k, Hindrance.DAMAGED, "bad")) for k in range(n)]
-    assert said == [False] * (n - 1) + [True]
+    notified = [bool(talk.update(k, Hindrance.DAMAGED, "bad")) for k in range(n)]
+    assert notified == [False] * (n - 1) + [True]
 
 
 def test_a_glider_that_calls_once_a_day_is_given_two_calls() -> None:
@@ -134,7 +134,7 @@ def test_a_glider_that_calls_once_a_day_is_given_two_calls() -> None:
 
 def test_a_pause_makes_another_deployment_of_it() -> None:
     talk = Talk(Sea())
-    assert not any(talk.hear(k, Unusable.NO_HEADING, "no heading") for k in (0, 1, 2, 10, 11, 12))
+    assert not any(talk.update(k, Unusable.NO_HEADING, "no heading") for k in (0, 1, 2, 10, 11, 12))
     assert talk.alerts == []
 
 
@@ -156,14 +156,14 @@ def test_silence_is_not_counted() -> None:
 
 def test_reminders_thin_out() -> None:
     talk = Talk(Sea())
-    days = [now(k) / DAY for k in range(30 * 6) if talk.hear(k, Unusable.NO_HEADING, "no heading")]
+    days = [now(k) / DAY for k in range(30 * 6) if talk.update(k, Unusable.NO_HEADING, "no heading")]
     assert [round(b - a) for a, b in pairwise(days)] == [1, 2, 4, 7, 7, 7]
 
 
 def test_the_same_trouble_again_is_another_thread() -> None:
     talk = Talk(Sea())
     for k in range(20):
-        talk.hear(k, *((Unusable.NO_HEADING, "no heading") if k != 8 else ()))
+        talk.update(k, *((Unusable.NO_HEADING, "no heading") if k != 8 else ()))
     assert [a.kind for a in talk.alerts] == [Kind.UNKNOWN, Kind.ALL_CLEAR, Kind.UNKNOWN]
     assert talk.alerts[0].incident != talk.alerts[2].incident
 
@@ -188,9 +188,9 @@ def test_while_it_goes_on_nobody_has_taken_it_on() -> None:
     """Who waits for an acknowledgement hears of it; there is no incident to acknowledge, but a mute."""
     talk = Talk(Sea())
     for k in range(7):
-        talk.hear(k, Unusable.NO_HEADING, "no heading")
+        talk.update(k, Unusable.NO_HEADING, "no heading")
     (alert,) = talk.alerts
-    assert unacknowledged(NotificationState(unknown=talk.said), (), {}) == {alert.incident}
+    assert unacknowledged(NotificationState(unknown=talk.notified), (), {}) == {alert.incident}
     assert "gliderwatch mute electa --hours 6" in escalated(alert, 1800.0).body
-    talk.hear(7)
-    assert unacknowledged(NotificationState(unknown=talk.said), (), {}) == frozenset()
+    talk.update(7)
+    assert unacknowledged(NotificationState(unknown=talk.notified), (), {}) == frozenset()

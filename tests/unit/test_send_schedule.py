@@ -11,7 +11,7 @@ import pytest
 
 import written
 from alert_support import SLOW, alert, incident
-from announcing import World
+from dives_by_letters import World
 from gliderwatch.incidents.acknowledgement import acknowledge
 from gliderwatch.incidents.notifications import NotificationState, due_notifications, unacknowledged
 from gliderwatch.incidents.overdue import ExpectedCall, Silence
@@ -21,7 +21,7 @@ from gliderwatch.messages.template import escalated
 from gliderwatch.model import Incident, Severity
 
 AMSTERDAM = ZoneInfo("Europe/Amsterdam")
-NEW = Standing(told=False, unanswered=True)
+NEW = Standing(notified=False, unanswered=True)
 NOON = datetime(2026, 6, 1, 12, tzinfo=UTC).timestamp()
 
 
@@ -65,7 +65,7 @@ def test_only_what_is_quieter_waits() -> None:
     ("standing", "expected"),
     [
         (NEW, Due(inf, NOON + 1800)),
-        (replace(NEW, told=True), Due(0.0, inf)),
+        (replace(NEW, notified=True), Due(0.0, inf)),
         (replace(NEW, unanswered=False), None),
         (replace(NEW, escalates=NOON + 60), Due(inf, NOON + 60)),  # with what waits already
         (NO_INCIDENT, Due(0.0, inf)),

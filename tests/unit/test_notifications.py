@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from announcing import HOUR, STEP, Talk, World, dive
+from dives_by_letters import HOUR, STEP, Talk, World, dive
 from gliderwatch.incidents.constants import NEWS
 from gliderwatch.incidents.notifications import NotificationState
 from gliderwatch.model import NextSurfacing, Severity, Unusable
@@ -12,28 +12,28 @@ from gliderwatch.model import NextSurfacing, Severity, Unusable
 
 def test_nothing_known_nothing_said():
     talk = Talk(notices=True)
-    assert talk.hear("") == [] and talk.said == NotificationState()
+    assert talk.update("") == [] and talk.notified == NotificationState()
 
 
 def test_an_incident_from_its_opening_to_its_end():
     talk = Talk()
-    said = [talk.hear("01100"[:n]) for n in range(1, 6)]
-    assert said == [[], [], ["anomaly"], [], ["all_clear"]]
+    notified = [talk.update("01100"[:n]) for n in range(1, 6)]
+    assert notified == [[], [], ["anomaly"], [], ["all_clear"]]
     assert [a.id for a in talk.alerts] == ["electa/anomaly/10800/0", "electa/anomaly/10800/1"]
     assert {a.incident for a in talk.alerts} == {"electa/anomaly/10800"}
 
 
 def test_the_same_knowledge_leads_to_nothing_more():
     talk = Talk(notices=True)
-    assert talk.hear("0110") == ["anomaly", "surfacing"]
-    said = talk.said
-    assert talk.hear("0110") == [] and talk.said == said
+    assert talk.update("0110") == ["anomaly", "surfacing"]
+    notified = talk.notified
+    assert talk.update("0110") == [] and talk.notified == notified
 
 
 def test_two_kinds_are_two_threads():
     talk = Talk()
-    talk.hear("022")
-    talk.hear("02211")
+    talk.update("022")
+    talk.update("02211")
     assert [(a.kind.value, a.severity) for a in talk.alerts] == [
         ("false_alarm", Severity.WARNING),
         ("all_clear", Severity.INFO),
@@ -45,143 +45,143 @@ def test_two_kinds_are_two_threads():
 def test_whoever_got_the_alarm_gets_its_end():
     talk = Talk()
     for letters in ("011", "01100"):
-        talk.hear(letters)
+        talk.update(letters)
     assert [a.audience for a in talk.alerts] == [Severity.CRITICAL, Severity.CRITICAL]
 
 
 class TestReminders:
     def test_they_come_in_the_time_of_the_data(self):
         talk = Talk(reminder_hours=24.0)
-        kinds = {n: talk.hear("0" + "1" * n) for n in range(2, 40)}
-        reminded = [n for n, said in kinds.items() if said == ["reminder"]]
+        kinds = {n: talk.update("0" + "1" * n) for n in range(2, 40)}
+        reminded = [n for n, notified in kinds.items() if notified == ["reminder"]]
         assert kinds[2] == ["anomaly"] and reminded == [10, 18, 34]  # after 1, 2 and 4 days of 8 dives
 
     def test_none_when_switched_off(self):
         talk = Talk(reminder_hours=None)
-        assert [talk.hear("0" + "1" * n) for n in (2, 60)] == [["anomaly"], []]
+        assert [talk.update("0" + "1" * n) for n in (2, 60)] == [["anomaly"], []]
 
     def test_none_for_a_closed_incident(self):
         talk = Talk()
-        talk.hear("01100")
-        assert talk.hear("01100" + "0" * 20) == []
+        talk.update("01100")
+        assert talk.update("01100" + "0" * 20) == []
 
     def test_an_incident_first_heard_of_when_old_is_not_reminded_of_at_once(self):
         """The last flagged dive is two days back: dives since then got no flag."""
         talk = Talk(reminder_hours=24.0)
-        assert talk.hear("011" + "-" * 16) == ["anomaly"]
-        assert talk.hear("011" + "-" * 16) == []
-        assert talk.hear("011" + "-" * 31) == []
-        assert talk.hear("011" + "-" * 32) == ["reminder"]
+        assert talk.update("011" + "-" * 16) == ["anomaly"]
+        assert talk.update("011" + "-" * 16) == []
+        assert talk.update("011" + "-" * 31) == []
+        assert talk.update("011" + "-" * 32) == ["reminder"]
 
     def test_a_correction_is_as_good_as_a_reminder(self):
         talk = Talk(reminder_hours=24.0)
-        talk.hear("011" + "1" * 6)
-        assert talk.hear("001" + "1" * 7) == ["correction"]
-        assert talk.hear("001" + "1" * 13) == []
-        assert talk.hear("001" + "1" * 16) == []
-        assert talk.hear("001" + "1" * 18) == ["reminder"]
+        talk.update("011" + "1" * 6)
+        assert talk.update("001" + "1" * 7) == ["correction"]
+        assert talk.update("001" + "1" * 13) == []
+        assert talk.update("001" + "1" * 16) == []
+        assert talk.update("001" + "1" * 18) == ["reminder"]
 
 
 class TestCorrections:
-    def told(self) -> tuple[Talk, World]:
+    def opened(self) -> tuple[Talk, World]:
         talk, world = Talk(), World.of("0110")
-        assert talk.hear(world) == ["anomaly"]
+        assert talk.update(world) == ["anomaly"]
         return talk, world
 
     def change(self, world: World, k: int, **changes) -> None:
         world.dives[k * STEP] = replace(world.dives[k * STEP], **changes)
 
     def test_when_the_final_current_changes_the_speed(self):
-        talk, world = self.told()
+        talk, world = self.opened()
         self.change(world, 2, speed=0.08, reference_u=0.05)
-        assert talk.hear(world) == ["correction"]
+        assert talk.update(world) == ["correction"]
         assert "depth-averaged current" in talk.alerts[-1].body
-        assert talk.hear(world) == []
+        assert talk.update(world) == []
 
     def test_when_the_final_current_changes_the_reference_alone(self):
-        talk, world = self.told()
+        talk, world = self.opened()
         self.change(world, 2, reference_v=0.30)
-        assert talk.hear(world) == ["correction"]
+        assert talk.update(world) == ["correction"]
 
     def test_when_a_current_comes_where_there_was_none(self):
         talk, world = Talk(), World.of("0110")
         self.change(world, 2, reference_u=None, reference_v=None)
-        talk.hear(world)
+        talk.update(world)
         self.change(world, 2, reference_u=0.0, reference_v=0.0)
-        assert talk.hear(world) == ["correction"]
+        assert talk.update(world) == ["correction"]
 
     def test_not_for_a_little(self):
-        talk, world = self.told()
+        talk, world = self.opened()
         self.change(world, 2, speed=0.12, reference_u=0.16)
-        assert talk.hear(world) == []
+        assert talk.update(world) == []
 
     def test_when_a_missing_segment_takes_the_flag_away(self):
-        talk, world = self.told()
+        talk, world = self.opened()
         self.change(world, 1, flag=0, speed=0.25)
-        assert talk.hear(world) == ["correction"]
+        assert talk.update(world) == ["correction"]
         assert "withdrawn" in talk.alerts[-1].title and talk.alerts[-1].severity == Severity.INFO
-        assert talk.hear(world) == []
+        assert talk.update(world) == []
 
     def test_when_a_withdrawn_incident_stands_after_all(self):
-        talk, world = self.told()
+        talk, world = self.opened()
         self.change(world, 1, flag=0, speed=0.25)
-        talk.hear(world)
+        talk.update(world)
         self.change(world, 1, flag=1, speed=0.15)
-        assert talk.hear(world) == ["correction"]
+        assert talk.update(world) == ["correction"]
         assert "stands" in talk.alerts[-1].title
         assert len({a.incident for a in talk.alerts}) == 1
 
     def test_when_it_began_earlier_than_told(self):
-        talk, world = self.told()
+        talk, world = self.opened()
         self.change(world, 0, flag=1, speed=0.15)
-        assert talk.hear(world) == ["correction"]
-        assert len(talk.said.threads) == 1
+        assert talk.update(world) == ["correction"]
+        assert len(talk.notified.threads) == 1
 
     def test_when_the_end_was_too_early(self):
         talk = Talk()
-        talk.hear("01100")
-        assert talk.hear("0110100") == ["correction"]
+        talk.update("01100")
+        assert talk.update("0110100") == ["correction"]
 
     def test_when_the_dive_is_not_the_same_any_more(self):
         """Late data show that the dive began a minute earlier."""
-        talk, world = self.told()
-        told = world.dives.pop(2 * STEP)
-        world.dives[2 * STEP - 60] = replace(told, t_dive=2 * STEP - 60)
-        assert talk.hear(world) == []
+        talk, world = self.opened()
+        opened = world.dives.pop(2 * STEP)
+        world.dives[2 * STEP - 60] = replace(opened, t_dive=2 * STEP - 60)
+        assert talk.update(world) == []
 
     def test_a_withdrawn_incident_is_no_cover_for_a_new_one(self):
         """What opens days later is news, not a correction of what was withdrawn."""
-        talk, world = self.told()
+        talk, world = self.opened()
         self.change(world, 1, flag=0, speed=0.25)
-        talk.hear(world)
+        talk.update(world)
         for k, letter in enumerate("0000000011", start=4):
             world.dives[k * STEP] = dive(k, letter)
-        assert talk.hear(world) == ["anomaly"]
-        assert len(talk.said.threads) == 2
+        assert talk.update(world) == ["anomaly"]
+        assert len(talk.notified.threads) == 2
 
     def test_two_incidents_that_turn_out_to_be_one(self):
         talk, world = Talk(), World.of("0110011")
-        assert talk.hear(world) == ["anomaly", "all_clear", "anomaly"]
+        assert talk.update(world) == ["anomaly", "all_clear", "anomaly"]
         self.change(world, 4, flag=1, speed=0.15)
-        assert talk.hear(world) == ["correction", "correction"]
+        assert talk.update(world) == ["correction", "correction"]
         titles = [a.title for a in talk.alerts[-2:]]
         assert sum("withdrawn" in t for t in titles) == 1 and sum("stands" in t for t in titles) == 1
 
 
 class TestHistory:
     def test_what_was_over_for_a_day_when_it_became_known_is_silent(self):
-        assert Talk().hear("01100" + "0" * 9) == []
+        assert Talk().update("01100" + "0" * 9) == []
 
     def test_what_ended_today_is_told_with_its_end(self):
-        assert Talk().hear("01100" + "0" * 5) == ["anomaly", "all_clear"]
+        assert Talk().update("01100" + "0" * 5) == ["anomaly", "all_clear"]
 
     def test_what_is_still_open_is_told_however_old(self):
-        assert Talk().hear("011" + "1" * 100) == ["anomaly"]
+        assert Talk().update("011" + "1" * 100) == ["anomaly"]
 
     def test_silent_history_stays_silent(self):
         talk = Talk()
         for n in range(9, 30):
-            assert talk.hear("01100" + "0" * n) == []
+            assert talk.update("01100" + "0" * n) == []
         assert pytest.approx(8 * STEP) == NEWS
 
 
@@ -190,42 +190,42 @@ class TestNotices:
         world, talk = World.of("00"), Talk(notices=True)
         last = max(a.t_surface for a in world.dives.values())
         world.next = NextSurfacing(last + 60, last + 3 * 3600, 600.0, 27.5, -84.0, 1e4, 0.0, 1e4, "test")
-        talk.hear(world)
+        talk.update(world)
         assert "Next call: 1970" in talk.alerts[-1].body and "084° 00.000' W" in talk.alerts[-1].body
         world, talk = World.of("00"), Talk(notices=True)
         world.next = NextSurfacing(last - 7200, last, 600.0, 27.5, -84.0, 1e4, 0.0, 1e4, "of an earlier one")
-        talk.hear(world)
+        talk.update(world)
         assert "Next call: not known" in talk.alerts[-1].body
 
     def test_one_a_surfacing(self):
         talk = Talk(notices=True)
-        assert [talk.hear("0" * n) for n in range(1, 4)] == [["surfacing"]] * 3
+        assert [talk.update("0" * n) for n in range(1, 4)] == [["surfacing"]] * 3
         assert len({a.id for a in talk.alerts}) == 3
 
     def test_only_the_latest_of_many(self):
         talk = Talk(notices=True)
-        assert talk.hear("00000") == ["surfacing"]
+        assert talk.update("00000") == ["surfacing"]
         assert talk.alerts[0].time == 4 * STEP + 2.5 * HOUR
 
     def test_never_of_an_older_one(self):
         talk = Talk(notices=True)
-        talk.hear("000 0")
-        assert talk.hear("00000") == []
+        talk.update("000 0")
+        assert talk.update("00000") == []
 
     def test_not_again_when_its_time_is_corrected(self):
         talk, world = Talk(notices=True), World.of("000")
-        talk.hear(world)
+        talk.update(world)
         for shift in (300.0, -300.0):
             world.dives[2 * STEP] = replace(dive(2, "0"), t_surface=2 * STEP + 2.5 * HOUR + shift)
-            assert talk.hear(world) == []
+            assert talk.update(world) == []
         world.dives[3 * STEP] = dive(3, "0")
-        assert talk.hear(world) == ["surfacing"]
+        assert talk.update(world) == ["surfacing"]
 
     def test_not_for_a_dive_that_has_not_ended(self):
         talk, world = Talk(notices=True), World.of("00")
-        talk.hear(world)
+        talk.update(world)
         world.dives[2 * STEP] = dive(2, "-", unusable=Unusable.NOT_SURFACED)
-        assert talk.hear(world) == []
+        assert talk.update(world) == []
 
     def test_none_when_nobody_wants_them(self):
-        assert Talk(notices=False).hear("000") == []
+        assert Talk(notices=False).update("000") == []

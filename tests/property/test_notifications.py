@@ -5,7 +5,7 @@ from dataclasses import replace
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from announcing import HOUR, STEP, Talk, World, dive
+from dives_by_letters import HOUR, STEP, Talk, World, dive
 from gliderwatch.incidents.constants import FLOW_CHANGE, NEWS, SPEED_CHANGE
 from gliderwatch.model import Kind
 
@@ -40,17 +40,17 @@ def check_all_is_said(talk: Talk, world: World) -> None:
     """Each thread tells what is known, each incident that is news has one thread."""
     latest = world.last_surfacing(float("inf"))
     incidents = {i.id: i for i in world.incidents()}
-    live = [t for t in talk.said.threads if not t.withdrawn]
-    about = [t.told.id for t in live]
+    live = [t for t in talk.notified.threads if not t.withdrawn]
+    about = [t.reported.id for t in live]
     assert len(set(about)) == len(about) and set(about) <= set(incidents)
     for thread in live:
-        now = incidents[thread.told.id]
-        assert (thread.told.since, thread.told.cleared_at) == (now.since, now.cleared_at)
-        known = world.dive(thread.dive.t_dive)
-        if known is not None and known.speed is not None and thread.dive.speed is not None:
-            assert known.flag == thread.dive.flag
-            assert abs(known.speed - thread.dive.speed) <= SPEED_CHANGE
-            assert abs(known.reference_u - thread.dive.reference_u) <= FLOW_CHANGE
+        now = incidents[thread.reported.id]
+        assert (thread.reported.since, thread.reported.cleared_at) == (now.since, now.cleared_at)
+        now_ = world.dive(thread.dive.t_dive)
+        if now_ is not None and now_.speed is not None and thread.dive.speed is not None:
+            assert now_.flag == thread.dive.flag
+            assert abs(now_.speed - thread.dive.speed) <= SPEED_CHANGE
+            assert abs(now_.reference_u - thread.dive.reference_u) <= FLOW_CHANGE
     for incident in incidents.values():
         news = incident.cleared_at is None or latest.t_surface - incident.cleared_at < NEWS
         assert not news or incident.id in about
@@ -65,7 +65,7 @@ def test_any_history(changes, reminder_hours, notices):
     for step, (what, letter, where) in enumerate(changes):
         change(world, what, letter, where, step)
         before = len(talk.alerts)
-        talk.hear(world)
+        talk.update(world)
         latest = world.last_surfacing(float("inf"))
         for alert in talk.alerts[before:]:
             if alert.kind == Kind.REMINDER:
@@ -75,8 +75,8 @@ def test_any_history(changes, reminder_hours, notices):
             spoken[alert.incident] = latest.t_surface
         if latest is not None:
             check_all_is_said(talk, world)
-        said = talk.said
-        assert talk.hear(world) == [] and talk.said == said
+        notified = talk.notified
+        assert talk.update(world) == [] and talk.notified == notified
     ids = [a.id for a in talk.alerts]
     assert len(set(ids)) == len(ids)
     assert surfacings == sorted(set(surfacings))
@@ -87,9 +87,11 @@ def test_any_history(changes, reminder_hours, notices):
 def test_heard_at_once_or_dive_by_dive_the_threads_end_alike(letters):
     """Save what was over for a day, which is silent when heard of at once."""
     one, by_one = Talk(), Talk()
-    one.hear(letters)
+    one.update(letters)
     for n in range(1, len(letters) + 1):
-        by_one.hear(letters[:n])
-    live = {t.id: (t.told.since, t.told.cleared_at) for t in by_one.said.threads if not t.withdrawn}
-    for thread in one.said.threads:
-        assert live[thread.id] == (thread.told.since, thread.told.cleared_at)
+        by_one.update(letters[:n])
+    live = {
+        t.id: (t.reported.since, t.reported.cleared_at) for t in by_one.notified.threads if not t.withdrawn
+    }
+    for thread in one.notified.threads:
+        assert live[thread.id] == (thread.reported.since, thread.reported.cleared_at)
