@@ -60,14 +60,14 @@ class TestAnnouncements:
         last = dive(5, "0", t_dive=dive(4, "0").t_surface, t_surface=dive(4, "0").t_surface + hours * HOUR)
         cleared = next(i.cleared_at for i in world.incidents())
         last = replace(last, t_surface=cleared + hours * HOUR)
-        assert len(Announcer().hear(World({**world.dives, last.t_dive: last}))) == count
+        assert len(Announcer().update(World({**world.dives, last.t_dive: last}))) == count
 
     def corrections(self, **changes) -> list[str]:
         """What is said when the last dive of an open incident is known better."""
         talk, world = Announcer(), World.of("011")
-        assert talk.hear(world) == ["anomaly"]
+        assert talk.update(world) == ["anomaly"]
         last = max(world.dives)
-        return talk.hear(World({**world.dives, last: replace(world.dives[last], **changes)}))
+        return talk.update(World({**world.dives, last: replace(world.dives[last], **changes)}))
 
     def test_a_speed_is_corrected_by_5_cm_s(self):
         assert self.corrections(speed=0.15 - 0.04) == []

@@ -65,7 +65,7 @@ def test_two_gliders_whose_files_come_under_one_name(later):
         other.append(replace(moved, id=replace(moved.id, name=f"unit-2023-318-7-{k}")))
     files = random.Random(7).sample(one + other, len(one + other))
     store = feed(files)
-    assert [irregularity_text.title(i) for i in irregularities("unit", [], store.facts("unit").places(12))] == [
-        "files of two gliders come under the name unit"
-    ]
+    assert [
+        irregularity_text.title(i) for i in irregularities("unit", [], store.facts("unit").places(12))
+    ] == ["files of two gliders come under the name unit"]
     assert not store.incidents("unit")
