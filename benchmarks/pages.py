@@ -26,6 +26,7 @@ import httpx
 import numpy as np
 
 from gliderwatch.figures import plots
+from gliderwatch.figures.coast import world
 from gliderwatch.incidents.notifications import NotificationState
 from gliderwatch.model import Assessment, NextSurfacing, Segment, SegmentId
 from gliderwatch.params import Attention
@@ -89,10 +90,10 @@ def surfacing(path: Path, folder: Path, names: list[str], now: float) -> None:
     t = np.arange(150.0) * 12600.0
     panel = plots.Panel("floor", "value (1)", "", (plots.Line("floor", t, np.sin(t)),))
     plots.svg(panel)  # the library is loaded before
-    page_writer.write_fleet(store, folder, attention, now)
+    page_writer.write_fleet(store, folder, attention, now, world())
     floor = cost(lambda: plots.as_svg(plots._drawn(panel)))
-    fleet = cost(lambda: page_writer.write_fleet(store, folder, attention, now))
-    one = cost(lambda: page_writer.write_glider(store, folder, names[0], attention[names[0]], now))
+    fleet = cost(lambda: page_writer.write_fleet(store, folder, attention, now, world()))
+    one = cost(lambda: page_writer.write_glider(store, folder, names[0], attention[names[0]], now, world()))
     store.close()
     sizes = {file.name: file.stat().st_size for file in folder.iterdir()}
     print(f"{len(names)} gliders: processor for the page of all {fleet:.3f} s, for one glider's {one:.3f} s")

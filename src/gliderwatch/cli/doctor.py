@@ -298,7 +298,7 @@ def _safely(topic: str, look: Callable[[], Iterable[Finding]]) -> Iterator[Findi
 def _checked(config: Config, path: Path, problems: list[Problem]) -> Iterator[Finding]:
     """Folders and permissions; `problems` gets all that `check` finds."""
     problems += preconditions.check(config, path)
-    found = doctor_checks.of_check("folders", problems, "dockserver", "gliders", "pages")
+    found = doctor_checks.of_check("folders", problems, "dockserver", "gliders", "pages", "maps")
     yield from found or [ok("folders", "all are there and can be read")]
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import click
 
 from gliderwatch.cli.export import at_option, configuration, looking, only_config_option, state_option
-from gliderwatch.cli.options import config_option, example, not_on_dockserver
-from gliderwatch.errors import GliderwatchError
+from gliderwatch.cli.options import DEFAULT, config_option, example, not_on_dockserver
+from gliderwatch.errors import ConfigError, GliderwatchError
 
 # ruff: noqa: PLC0415
 # What a command needs is imported in it: `status` in a health check must not wait for what draws.
@@ -27,6 +27,9 @@ def pages(config_path: Path | None, state: Path | None, out: Path | None, at: st
 
     Without --out they go where the service keeps them up to date by itself, to pages.folder.
     """
+    from gliderwatch.config.check import check_maps
+    from gliderwatch.figures.coast import world
+    from gliderwatch.figures.map_files import land_or_world
     from gliderwatch.params import Attention
     from gliderwatch.service import page_writer
 
@@ -34,15 +37,19 @@ def pages(config_path: Path | None, state: Path | None, out: Path | None, at: st
     folder = out or (Path(config.pages.folder) if config is not None and config.pages.folder else None)
     if folder is None:
         raise click.UsageError("name the folder: --out FOLDER, or pages.folder in the configuration")
+    land = world()
     if config is not None:
         not_on_dockserver(config, folder / "index.html")
+        land, reason = land_or_world(config.maps.files)
+        if reason:
+            raise ConfigError("\n".join(map(str, check_maps(config, config_path or DEFAULT))) or reason)
     with looking(config, state, at) as (store, now):
         known = store.gliders()
         names = {*known, *(config.gliders if config is not None and state is None else ())}
         attention = {n: config.attention(n) if config is not None else Attention() for n in names}
-        page_writer.write_fleet(store, folder, attention, now)
+        page_writer.write_fleet(store, folder, attention, now, land)
         for name in known:
-            page_writer.write_glider(store, folder, name, attention[name], now)
+            page_writer.write_glider(store, folder, name, attention[name], now, land)
     click.echo(f"{folder / 'index.html'}: {len(known)} gliders")
 
 

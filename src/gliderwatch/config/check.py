@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -38,8 +38,16 @@ def check(config: Config, path: Path) -> list[Problem]:
 
     What can be read depends on the user: run it as the user that runs the service.
     """
-    parts = (_roots, _gliders, _caches, _state, _channels, _recipients)
-    findings = [found for part in parts for found in part(config)]
+    parts = (_roots, _gliders, _caches, _state, _channels, _recipients, _maps)
+    return _problems(config, path, (found for part in parts for found in part(config)))
+
+
+def check_maps(config: Config, path: Path) -> list[Problem]:
+    """Files of maps that cannot be used."""
+    return _problems(config, path, _maps(config))
+
+
+def _problems(config: Config, path: Path, findings: Iterable[_Finding]) -> list[Problem]:
     return [
         Problem(each.severity, f"{path}:{config.locate(each.key)}", f"{each.key}: {each.text}", each.cure)
         for each in findings
@@ -182,3 +190,12 @@ def _recipients(config: Config) -> _Findings:
     if late:
         text = f"nobody gets the alerts of these at once: {', '.join(late)}"
         yield _warning("recipients", text, "leave `unacknowledged_minutes` out for who is on duty")
+
+
+def _maps(config: Config) -> _Findings:
+    for i, file in enumerate(config.maps.files):
+        from gliderwatch.figures.map_files import land_or_world  # noqa: PLC0415 (shapely is slow to load)
+
+        _, reason = land_or_world([file])
+        if reason:
+            yield _error(f"maps.files.{i}", reason, "maps are drawn without it until then")

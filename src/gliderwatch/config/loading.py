@@ -21,6 +21,7 @@ from gliderwatch.config.schema import (
     FieldSetting,
     Glider,
     Heartbeat,
+    Maps,
     Metrics,
     Ocean,
     Operator,
@@ -61,6 +62,7 @@ class Config(Section):
     operator: Operator = Field(default=Operator(), description="When the operator gets a message.")
     heartbeat: Heartbeat = Field(default=Heartbeat(), description="For a dead man's switch.")
     metrics: Metrics = Field(default=Metrics(), description="For Prometheus.")
+    maps: Maps = Field(default=Maps(), description="Finer maps.")
     pages: Pages = Field(default=Pages(), description="Pages for pilots as files.")
     web: Web = Field(default=Web(), description="The pages live.")
     _document: Document = PrivateAttr(Document(Path("configuration"), None, {}))

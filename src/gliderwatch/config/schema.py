@@ -470,6 +470,17 @@ class Operator(Section):
     )
 
 
+class Maps(Section):
+    """Coast and depths on maps, of pages and of mails, finer than what gliderwatch brings along."""
+
+    files: tuple[AbsolutePath, ...] = Field(
+        default=(),
+        description="Land as polygons (`.geojson`, `.shp`, in degrees), and heights above the sea on a grid "
+        "(`.nc`, as GEBCO and ETOPO give them), for lines of equal depth and the coast. Each counts where it "
+        "has data, that named first before the others; read again when it changes.",
+    )
+
+
 class Pages(Section):
     """Pages for pilots as files: of the fleet and of each glider, for any web server."""
 

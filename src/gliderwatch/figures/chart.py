@@ -10,7 +10,7 @@ from math import asinh, atan, ceil, cos, degrees, floor, hypot, pi, radians, sin
 
 import numpy as np
 
-from gliderwatch.figures.coast import Box, Land, rings_in
+from gliderwatch.figures.coast import Box, Land, depth_lines_in, rings_in
 from gliderwatch.incidents.notices import DriftEllipse
 from gliderwatch.model import Array
 from gliderwatch.navigation.geodesy import from_plane, radii
@@ -29,6 +29,10 @@ GRIDS = (0.8, 1.6, 3.2)
 """Units of the picture to which the coast is rounded, and below two of which an island is left out: the first
 with which it takes no more than `COAST` characters."""
 COAST = 40_000
+DEPTHS = 25_000
+"""Characters that lines of equal depth take at the most."""
+SPECK = 6.0
+"""Units of the picture below which a line of equal depth is left out."""
 STEPS = (30.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 1 / 6, 1 / 12, 1 / 30, 1 / 60)
 """Degrees between two lines of the graticule: whole minutes."""
 ARROW = 300.0
@@ -37,6 +41,7 @@ LONGEST = 45.0
 STYLE = """\
 .map{background:var(--sea);font:12px system-ui,sans-serif}.map text{fill:var(--ink)}
 .map .land{fill:var(--land);stroke:var(--shore);stroke-width:.8}
+.map .cover{fill:var(--sea)}.map .depth{stroke:var(--shore);stroke-opacity:.45;stroke-width:.8;fill:none}
 .map .grid{stroke:var(--ink);stroke-opacity:.18;fill:none}.map .faint{
 fill-opacity:.65;font-size:10px}.map .track{fill:none;stroke:var(--quiet);stroke-width:1.5}.map .current{
 stroke:var(--ok);stroke-width:1.4;fill:none}.map .area{fill:var(--warn);fill-opacity:.13;stroke:var(--warn);
@@ -167,6 +172,8 @@ def svg(chart: Chart, land: Land) -> str:
         f'aria-label="{escape(chart.title)}">',
         f"<title>{escape(chart.title)}</title>",
         f'<path class="land" fill-rule="evenodd" d="{_coast(view, land)}"/>',
+        *_finer(view, land),
+        *_depths(view, land),
         *_graticule(view),
         *(_area(view, *area) for area in chart.areas),
         *(f'<path class="track" d="{_line(view, track)}"/>' for track in chart.tracks if len(track) > 1),
@@ -189,6 +196,24 @@ def _coast(view: Frame, land: Land) -> str:
     return path
 
 
+def _finer(view: Frame, land: Land) -> Iterable[str]:
+    """Land of files: first the sea in the place of what lay there, then their coast."""
+    for box, part in land.finer:
+        for corners in covers(view, box):
+            yield f'<path class="cover" d="{_ring(corners, 0.1)}"/>'
+        yield f'<path class="land" fill-rule="evenodd" d="{_coast(view, part)}"/>'
+
+
+def covers(view: Frame, box: Box) -> Iterable[Array]:
+    """The corners (4, 2) of a box of the earth in the picture, wherever it is seen."""
+    shown = view.box(8.0)
+    for turn in (-360.0, 0.0, 360.0):
+        west, east = max(box.west + turn, shown.west), min(box.east + turn, shown.east)
+        south, north = max(box.south, shown.south), min(box.north, shown.north)
+        if west < east and south < north:
+            yield view.straight(np.array([south, north, north, south]), np.array([west, west, east, east]))
+
+
 def _ring(xy: Array, grid: float) -> str:
     steps = np.round(xy / grid).astype(int)
     steps = steps[np.any(steps != np.roll(steps, 1, axis=0), axis=1)]
@@ -197,6 +222,44 @@ def _ring(xy: Array, grid: float) -> str:
     first, rest = steps[0] * grid, np.diff(steps, axis=0) * grid
     pairs = " ".join(f"{x:.4g} {y:.4g}" for x, y in rest.tolist())
     return f"M{first[0]:.1f} {first[1]:.1f}l{pairs.replace(' -', '-')}z"
+
+
+def _depths(view: Frame, land: Land) -> Iterable[str]:
+    """Lines of equal depth, one path for each depth, and how deep it is where there is room for that."""
+    parts = depth_paths(view, land)
+    grid = next((g for g in GRIDS if sum(map(len, _depth_texts(parts, g))) <= DEPTHS), None)
+    if grid is None:
+        return
+    for text in _depth_texts(parts, grid):
+        yield f'<path class="depth" d="{text}"/>'
+    for (x, y), depth in depth_labels(parts):
+        yield _text(x, y, f"{depth:g} m", "middle", "halo faint")
+
+
+def _depth_texts(parts: dict[float, list[Array]], grid: float) -> list[str]:
+    return ["".join(_ring(xy, grid).removesuffix("z") for xy in lines) for lines in parts.values()]
+
+
+def depth_paths(view: Frame, land: Land) -> dict[float, list[Array]]:
+    """Lines of equal depth in the picture, by depth (m), without those that are only a speck."""
+    parts: dict[float, list[Array]] = {}
+    for line in depth_lines_in(land, view.box(8.0)):
+        xy = view.straight(line.points[:, 1], line.points[:, 0])
+        if np.ptp(xy, axis=0).max() >= SPECK:
+            parts.setdefault(line.depth, []).append(xy)
+    return parts
+
+
+def depth_labels(parts: dict[float, list[Array]]) -> Iterable[tuple[tuple[float, float], float]]:
+    """Where the depth (m) of lines can be written: in the middle of the longest, apart from others."""
+    taken: list[tuple[float, float]] = []
+    for depth, lines in parts.items():
+        xy = max(lines, key=lambda line: float(np.ptp(line, axis=0).max()))
+        x, y = xy[len(xy) // 2].tolist()
+        is_inside = 30 < x < WIDTH - 40 and 20 < y < HEIGHT - 45
+        if is_inside and all(abs(x - a) > 40 or abs(y - b) > 14 for a, b in taken):
+            taken.append((x, y))
+            yield (x, y), depth
 
 
 def _line(view: Frame, places: Iterable[Place]) -> str:

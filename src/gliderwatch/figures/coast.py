@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import lzma
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
 import numpy as np
+import numpy.typing as npt
 
 from gliderwatch.model import Array, readonly
 
@@ -24,13 +25,34 @@ class Box:
 
 
 @dataclass(frozen=True, slots=True)
+class DepthLine:
+    """A line of equal ``depth`` (m): ``points`` (n, 2) longitude, latitude (degrees)."""
+
+    depth: float
+    points: Array
+
+
+@dataclass(frozen=True, slots=True)
 class Land:
     """Closed rings of land and of lakes in it: ``points`` (n, 2) longitude, latitude (degrees), all in a row;
-    ring i is points[starts[i]:starts[i + 1]], within ``bounds`` (rings, 4): west, south, east, north."""
+    ring i is points[starts[i]:starts[i + 1]], within ``bounds`` (rings, 4): west, south, east, north.
+
+    Where files give them (`map_files`): ``finer`` land, each in place of all before it within its box, and
+    lines of equal depth (``depths``).
+    """
 
     points: Array
     starts: tuple[int, ...]
     bounds: Array
+    finer: tuple[tuple[Box, Land], ...] = ()
+    depths: tuple[DepthLine, ...] = ()
+
+
+def land_of(rings: Sequence[Array]) -> Land:
+    """Land of closed rings (n, 2) of longitude and latitude (degrees) without their first point again."""
+    starts = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])]).astype(int)
+    points = np.concatenate(rings) if rings else np.zeros((0, 2))
+    return Land(readonly(points), tuple(starts.tolist()), readonly(_bounds(points, starts)))
 
 
 @cache
@@ -54,8 +76,29 @@ def world() -> Land:
     summed = np.cumsum(whole, axis=0)
     summed += np.repeat(first - summed[starts[:-1]], lengths, axis=0)
     points = summed * scale + shift
+    return Land(readonly(points), tuple(starts.tolist()), readonly(_bounds(points, starts)))
+
+
+def _bounds(points: Array, starts: npt.NDArray[np.int_]) -> Array:
+    """West, south, east, north of each ring."""
     low, high = (np.asarray(f.reduceat(points, starts[:-1], axis=0)) for f in (np.minimum, np.maximum))
-    return Land(readonly(points), tuple(starts.tolist()), readonly(np.hstack([low, high])))
+    return np.hstack([low, high]) if len(points) else np.zeros((0, 4))
+
+
+def depth_lines_in(land: Land, box: Box) -> Iterator[DepthLine]:
+    """The parts of lines of equal depth in a box, longitudes as those of the box."""
+    for line in land.depths:
+        for turn in (-360.0, 0.0, 360.0):
+            points = line.points + np.array([turn, 0.0])
+            x, y = points.T
+            inside = (x >= box.west) & (x <= box.east) & (y >= box.south) & (y <= box.north)
+            if not inside.any():
+                continue
+            kept = inside | np.append(inside[1:], False) | np.append(False, inside[:-1])  # and one beyond
+            edges = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]])))
+            for begin, end in zip(edges[::2], edges[1::2], strict=True):
+                if end - begin > 1:
+                    yield DepthLine(line.depth, points[begin:end])
 
 
 def rings_in(land: Land, box: Box, least: float = 0.0) -> Iterator[Array]:

@@ -13,6 +13,9 @@ from gliderwatch.figures.chart import (
     Frame,
     Mark,
     arrow_scale,
+    covers,
+    depth_labels,
+    depth_paths,
     frame,
     meridians,
     outline,
@@ -50,6 +53,7 @@ def png(chart: Chart, land: Land) -> bytes:
     axis.grid(visible=False)
     axis.spines[:].set_visible(True)
     _land(axis, view, land)
+    _depths(axis, view, land)
     _graticule(axis, view)
     _areas(axis, view, chart)
     _tracks(axis, view, chart)
@@ -75,14 +79,30 @@ def png(chart: Chart, land: Land) -> bytes:
 
 
 def _land(axis: Any, view: Frame, land: Land) -> None:
-    """The land, and lakes in it, as one area (even-odd)."""
-    path, patches = library().path.Path, library().patches
+    """The land, and lakes in it, as one area; then that of files, each in the place of what lay there."""
     rings = [view.straight(ring[:, 1], ring[:, 0]) for ring in rings_in(land, view.box(8.0))]
+    _fill(axis, rings, facecolor=LAND, edgecolor=SHORE, linewidth=0.8)
+    for box, part in land.finer:
+        _fill(axis, list(covers(view, box)), facecolor=SEA, linewidth=0.0)
+        _land(axis, view, part)
+
+
+def _fill(axis: Any, rings: list[Array], **style: object) -> None:
+    path, patches = library().path.Path, library().patches
     if not rings:
         return
     codes = [np.r_[path.MOVETO, np.full(len(ring) - 2, path.LINETO), path.CLOSEPOLY] for ring in rings]
     shape = path(np.concatenate(rings), np.concatenate(codes))
-    axis.add_patch(patches.PathPatch(shape, facecolor=LAND, edgecolor=SHORE, linewidth=0.8, zorder=1))
+    axis.add_patch(patches.PathPatch(shape, zorder=1, **style))
+
+
+def _depths(axis: Any, view: Frame, land: Land) -> None:
+    parts = depth_paths(view, land)
+    for lines in parts.values():
+        for xy in lines:
+            axis.plot(*xy.T, "-", color=SHORE, alpha=0.5, linewidth=0.7, zorder=1.5)
+    for (x, y), depth in depth_labels(parts):
+        _label(axis, x, y, f"{depth:g} m", "center", "center", size=7)
 
 
 def _graticule(axis: Any, view: Frame) -> None:
@@ -179,7 +199,9 @@ def _scale(axis: Any, view: Frame) -> None:
     )
 
 
-def _label(axis: Any, x: float, y: float, label: str, side: str, height: str = "baseline") -> None:
+def _label(
+    axis: Any, x: float, y: float, label: str, side: str, height: str = "baseline", size: float = 8.5
+) -> None:
     """Words with an edge of the colour of the sea, so that they can be read on lines."""
     edge = library().patheffects.withStroke(linewidth=2.5, foreground=SEA)
     axis.text(
@@ -188,7 +210,7 @@ def _label(axis: Any, x: float, y: float, label: str, side: str, height: str = "
         label,
         ha=side,
         va=height,
-        fontsize=8.5,
+        fontsize=size,
         color=INK,
         zorder=8,
         path_effects=[edge],

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.figures.coast import world
+from gliderwatch.figures.coast import Land
 from gliderwatch.pages.reading import read_fleet
 from gliderwatch.pages.render import Frame, file_of, fleet_page, glider_page, sheet_page
 from gliderwatch.pages.view import GliderView
@@ -21,17 +21,17 @@ LEFT_OVER = 3600.0
 """Seconds after which what a killed writer left is removed."""
 
 
-def write_fleet(store: Store, folder: Path, attention: dict[str, Attention], now: float) -> None:
+def write_fleet(store: Store, folder: Path, attention: dict[str, Attention], now: float, land: Land) -> None:
     """Write the page of all gliders, those of `attention`. Raises GliderwatchError where that cannot be."""
     views = read_fleet(store, sorted(attention), lambda name: attention[name], now)
-    put(folder / FLEET, fleet_page(views, Frame(now, now + FLEET_DUE), world()))
+    put(folder / FLEET, fleet_page(views, Frame(now, now + FLEET_DUE), land))
 
 
-def write_glider(view: GliderView, folder: Path) -> None:
+def write_glider(view: GliderView, folder: Path, land: Land) -> None:
     """Write the pages of one glider. Raises GliderwatchError where that cannot be."""
     frame = Frame(view.now, view.now + GLIDER_DUE)
-    put(folder / file_of(view.name), glider_page(view, frame, world()))
-    put(folder / file_of(view.name, "-sheet"), sheet_page(view, frame, world()))
+    put(folder / file_of(view.name), glider_page(view, frame, land))
+    put(folder / file_of(view.name, "-sheet"), sheet_page(view, frame, land))
 
 
 def put(path: Path, text: str) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import TimeoutError as NotInTime
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import structlog
@@ -26,12 +27,14 @@ _NICENESS = 3
 
 @dataclass(frozen=True, slots=True)
 class PictureJob:
-    """What is to be drawn: a ``glider`` as the state file ``state`` has it at ``now`` (s)."""
+    """What is to be drawn: a ``glider`` as the state file ``state`` has it at ``now`` (s), on a map with what
+    the files ``maps`` have."""
 
     state: Path
     glider: str
     attention: Attention
     now: float
+    maps: tuple[str, ...] = ()
 
 
 # ruff: noqa: PLC0415
@@ -41,7 +44,7 @@ class PictureJob:
 def draw(job: PictureJob) -> tuple[Picture, ...]:
     """The pictures of a glider; none of what it has no values for. Raises GliderwatchError."""
     from gliderwatch.figures import dives, map_png, plots
-    from gliderwatch.figures.coast import world
+    from gliderwatch.figures.map_files import land_or_world
     from gliderwatch.pages import maps, reading
     from gliderwatch.store.state_file import Store
 
@@ -56,19 +59,20 @@ def draw(job: PictureJob) -> tuple[Picture, ...]:
         panel = dives.speed(view.dives)
         made.append(Picture("speed.png", panel.shows, plots.png(panel)))
     chart = maps.of_glider(replace(view, dives=view.dives[-PLACES:]))
-    map_of = map_png.png(chart, world())
+    land, _ = land_or_world(job.maps)
+    map_of = map_png.png(chart, land)
     if map_of:
         made.append(Picture("map.png", chart.title, map_of))
     return tuple(made)
 
 
-def warm() -> None:
+def warm(maps: tuple[str, ...]) -> None:
     """Load what the first picture would wait for: matplotlib, its fonts, the coast."""
     from gliderwatch.figures import map_png
     from gliderwatch.figures.chart import Chart, Mark
-    from gliderwatch.figures.coast import world
+    from gliderwatch.figures.map_files import land_or_world
 
-    map_png.png(Chart("", marks=(Mark((0.0, 0.0), "warm"),)), world())
+    map_png.png(Chart("", marks=(Mark((0.0, 0.0), "warm"),)), land_or_world(maps)[0])
 
 
 class MailPictures:
@@ -83,12 +87,13 @@ class MailPictures:
         state: Path,
         attention: Callable[[str], Attention],
         now: Callable[[], float],
+        maps: tuple[str, ...] = (),
         draw: Callable[[PictureJob], tuple[Picture, ...]] = draw,
         limit: float = LIMIT,
     ) -> None:
         self._state, self.attention, self._now = state, attention, now
-        self._draw, self._limit = draw, limit
-        self._process = DrawingProcess(_NICENESS, warm)
+        self._draw, self._limit, self._maps = draw, limit, maps
+        self._process = DrawingProcess(_NICENESS, partial(warm, maps))
 
     def prepare(self) -> None:
         """Begin the process, so that the first mail need not wait for it."""
@@ -98,7 +103,7 @@ class MailPictures:
         """The pictures of a message; none of one about no glider, nor where they are not there in time."""
         if not alert.glider:
             return ()
-        job = PictureJob(self._state, alert.glider, self.attention(alert.glider), self._now())
+        job = PictureJob(self._state, alert.glider, self.attention(alert.glider), self._now(), self._maps)
         making = self._process.begin(self._draw, job, self._limit, self._state)
         if making is None:
             return ()

@@ -17,6 +17,7 @@ from gliderwatch.params import Attention
 from gliderwatch.service.drawing import DrawingProcess
 
 if TYPE_CHECKING:
+    from gliderwatch.figures.coast import Land
     from gliderwatch.store.state_file import Store
 
 log = structlog.get_logger(__name__)
@@ -30,12 +31,14 @@ _NICENESS = 10
 
 @dataclass(frozen=True, slots=True)
 class PageJob:
-    """What is to be written: the pages of a ``glider``, or, where that is empty, the one of all."""
+    """What is to be written: the pages of a ``glider``, or, where that is empty, the one of all; with maps of
+    the files ``maps``."""
 
     state: Path
     folder: Path
     attention: dict[str, Attention] = field(default_factory=dict)
     glider: str = ""
+    maps: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,43 +46,47 @@ class PagesWritten:
     """News for the daemon: what was begun is done, or was given up."""
 
 
-def write(job: PageJob) -> None:
-    """Write the pages of a job, and what lies beside them for other programs. Raises GliderwatchError."""
+def write(job: PageJob) -> str:
+    """Write the pages of a job, and what lies beside them for other programs; why the maps have the coast of
+    the package alone, if they do. Raises GliderwatchError."""
+    from gliderwatch.figures.map_files import land_or_world
     from gliderwatch.store.state_file import Store
 
     store, now = Store.reading(job.state), time.time()
+    land, reason = land_or_world(job.maps)
     try:
         with store.guarded():
             if job.glider:
-                write_glider(store, job.folder, job.glider, job.attention[job.glider], now)
+                write_glider(store, job.folder, job.glider, job.attention[job.glider], now, land)
             else:
-                write_fleet(store, job.folder, job.attention, now)
+                write_fleet(store, job.folder, job.attention, now, land)
     finally:
         store.close()
+    return reason
 
 
 # ruff: noqa: PLC0415
 # Nothing that draws is loaded in the daemon, which imports this module too.
 
 
-def write_fleet(store: Store, folder: Path, attention: dict[str, Attention], now: float) -> None:
+def write_fleet(store: Store, folder: Path, attention: dict[str, Attention], now: float, land: Land) -> None:
     """Write what is of all gliders, those of `attention`, as known at `now` (s). Raises GliderwatchError."""
     from gliderwatch.export import maps
     from gliderwatch.pages import render, writing
 
     writing.clear(folder, now)
-    writing.write_fleet(store, folder, attention, now)
+    writing.write_fleet(store, folder, attention, now, land)
     links = [render.file_of(name, ending="kml") for name in store.gliders()]
     writing.put(folder / "gliders.kml", maps.as_kml_link(links))
 
 
-def write_glider(store: Store, folder: Path, name: str, attention: Attention, now: float) -> None:
+def write_glider(store: Store, folder: Path, name: str, attention: Attention, now: float, land: Land) -> None:
     """Write what is of one glider, as known at `now` (s). Raises GliderwatchError."""
     from gliderwatch.export import maps
     from gliderwatch.pages import reading, render, writing
 
     view = reading.read_glider(store, name, attention, now)
-    writing.write_glider(view, folder)
+    writing.write_glider(view, folder, land)
     writing.put(folder / render.file_of(name, ending="geojson"), maps.as_geojson((view,)))
     writing.put(folder / render.file_of(name, ending="kml"), maps.as_kml((view,)))
 
@@ -94,13 +101,13 @@ class PageWriter:
     def __init__(
         self,
         news: Callable[[PagesWritten], None],
-        write: Callable[[PageJob], None] = write,
+        write: Callable[[PageJob], str] = write,
         limit: float = LIMIT,
     ) -> None:
         self._news, self._write, self._limit = news, write, limit
         self._config: Config | None = None
         self._process = DrawingProcess(_NICENESS)
-        self._job: Future[None] | None = None
+        self._job: Future[str] | None = None
         self._waiting: dict[str, None] = {}
         self._written: dict[str, float] = {}
 
@@ -130,7 +137,8 @@ class PageWriter:
         self._written[name] = monotonic
         if not name or name in gliders:
             attention = {each: config.attention(each) for each in ([name] if name else names)}
-            self._begin(PageJob(Path(config.state.path), Path(config.pages.folder), attention, name))
+            state, folder = Path(config.state.path), Path(config.pages.folder)
+            self._begin(PageJob(state, folder, attention, name, config.maps.files))
 
     @property
     def is_idle(self) -> bool:
@@ -146,9 +154,11 @@ class PageWriter:
         if self._job is not None:
             self._job.add_done_callback(partial(self._ended, job))
 
-    def _ended(self, job: PageJob, done: Future[None]) -> None:
+    def _ended(self, job: PageJob, done: Future[str]) -> None:
         error = None if done.cancelled() else done.exception()
         if error is not None:
             what = str(error) or type(error).__name__
             log.warning("pages not written", glider=job.glider or "all", folder=str(job.folder), reason=what)
+        elif not done.cancelled() and (reason := done.result()):
+            log.warning("map file cannot be used", reason=reason)
         self._news(PagesWritten())

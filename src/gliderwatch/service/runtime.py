@@ -172,7 +172,7 @@ def build(
         pictures.attention = config.attention
     else:
         state = Path(config.state.path)
-        pictures = MailPictures(state, config.attention, time.time)
+        pictures = MailPictures(state, config.attention, time.time, config.maps.files)
         channels: dict[str, Sender] = {
             name: Channel(name, url, pictures if config.channels[name].pictures else None)
             for name, url in urls.items()
@@ -215,5 +215,9 @@ def build(
 
 def _sends_as(before: Config, config: Config) -> bool:
     """Whether messages have the same links and pictures by two configurations."""
-    with_pictures = ({n for n, c in each.channels.items() if c.pictures} for each in (before, config))
-    return before.web.public_url == config.web.public_url and next(with_pictures) == next(with_pictures)
+
+    def sends(each: Config) -> tuple[object, ...]:
+        with_pictures = {name for name, channel in each.channels.items() if channel.pictures}
+        return each.web.public_url, with_pictures, each.maps.files
+
+    return sends(before) == sends(config)

@@ -25,7 +25,7 @@ from gliderwatch.delivery import links
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.export import maps
 from gliderwatch.export.dives import assessment_line
-from gliderwatch.figures.coast import world
+from gliderwatch.figures.map_files import land_or_world
 from gliderwatch.messages.formatting import clean
 from gliderwatch.pages import render
 from gliderwatch.pages.reading import read_fleet, read_glider
@@ -74,7 +74,7 @@ class Site:
     def _make(self, path: str) -> str:
         frame = self.frame(path)
         if path == "index.html":
-            return render.fleet_page(self.fleet(frame.now), frame, world())
+            return render.fleet_page(self.fleet(frame.now), frame, land_or_world(self.config.maps.files)[0])
         store = Store.reading(self.state)
         try:
             with store.guarded():
@@ -82,7 +82,7 @@ class Site:
                     for kind, page in (("", render.glider_page), ("-sheet", render.sheet_page)):
                         if path == render.file_of(name, kind):
                             view = read_glider(store, name, self.config.attention(name), frame.now)
-                            return page(view, frame, world())
+                            return page(view, frame, land_or_world(self.config.maps.files)[0])
         finally:
             store.close()
         raise KeyError(path)
