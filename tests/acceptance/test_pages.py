@@ -41,7 +41,10 @@ def test_pages_follow_each_file_and_a_stopped_drawer_holds_up_nothing(site: Site
         until((folder / "angus.html").exists, "page of angus")
         until(lambda: "angus" in (folder / "index.html").read_text(), "page of all")
         assert "<h1>angus" in (folder / "angus.html").read_text()
-        until((folder / "angus-sheet.html").exists, "sheet of angus")
+        until((folder / "angus.nc").exists, "NetCDF of angus")
+        assert {"angus-sheet.html", "angus.geojson", "angus.kml", "angus.csv"} <= {
+            path.name for path in folder.iterdir()
+        }
         until(lambda: drawing(daemon), "the process that draws")
         for pid in drawing(daemon):
             os.kill(pid, signal.SIGSTOP)
@@ -70,9 +73,11 @@ def test_pages_of_a_replay_are_written_by_command(site: Site, tmp_path: Path) ->
 def test_pages_are_not_written_on_the_dockserver(site: Site) -> None:
     site.state.parent.mkdir()
     Store.open(site.state).close()
-    result = command("pages", "-c", site.config, "--out", site.root / "pages")
-    assert result.returncode == 2
-    assert "nothing is written there" in result.stderr
+    for words in (("pages",), ("export", "--format", "csv")):
+        result = command(*words, "-c", site.config, "--out", site.root / "new" / "pages")
+        assert result.returncode == 2
+        assert "nothing is written there" in result.stderr
+        assert not (site.root / "new").exists()
     document = json.loads(site.config.read_text()) | {"pages": {"folder": str(site.root / "pages")}}
     site.config.write_text(json.dumps(document))
     result = command("run", "-c", site.config)

@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gliderwatch.cli.options import DEFAULT, FILE, config_option, configured, example, json_option
+from gliderwatch.cli.options import (
+    DEFAULT,
+    FILE,
+    config_option,
+    configured,
+    example,
+    json_option,
+    not_on_dockserver,
+)
 from gliderwatch.errors import ConfigError, GliderwatchError
 
 # ruff: noqa: PLC0415
@@ -71,13 +79,12 @@ def looking(config: Config | None, state: Path | None, at: str | None) -> Iterat
 
 @contextmanager
 def viewing(
-    config_path: Path | None, state: Path | None, at: str | None, glider: str | None
+    config: Config | None, state: Path | None, at: str | None, glider: str | None
 ) -> Iterator[tuple[Store, tuple[GliderView, ...]]]:
     """The state file, and what is known of one glider or of all. Raises GliderwatchError where nothing is."""
     from gliderwatch.pages import reading
     from gliderwatch.params import Attention
 
-    config = configuration(config_path, state)
     with looking(config, state, at) as (store, now):
         names = store.gliders()
         if glider is not None and glider.lower() not in names:
@@ -127,9 +134,12 @@ def export(
     """
     from gliderwatch.export import dives, maps
 
+    config = configuration(config_path, state)
     if out is not None:
+        if config is not None:
+            not_on_dockserver(config, out)
         out.parent.mkdir(parents=True, exist_ok=True)
-    with viewing(config_path, state, at, glider) as (store, views):
+    with viewing(config, state, at, glider) as (store, views):
         if form in ("netcdf", "layers"):
             if out is None or len(views) != 1:
                 raise click.UsageError(
@@ -182,7 +192,7 @@ def where(
 
     if ais is not None and glider is None:
         raise click.UsageError("--ais is of one glider: name it")
-    with viewing(config_path, state, at, glider) as (_, views):
+    with viewing(configuration(config_path, state), state, at, glider) as (_, views):
         found = [(view, view.whereabouts()) for view in views]
     if as_json:
         listed = [
@@ -225,7 +235,6 @@ def field(config_path: Path, name: str, out: Path, at: str | None, state: Path |
 
     NAME is that of a field under `fields:` in the configuration. Only samples until the time count.
     """
-    from gliderwatch.cli.options import not_on_dockserver
     from gliderwatch.config import load
     from gliderwatch.config.fields import moment
     from gliderwatch.messages.formatting import utc

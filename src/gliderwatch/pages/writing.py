@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from gliderwatch.errors import GliderwatchError
@@ -35,16 +37,23 @@ def write_glider(view: GliderView, folder: Path, land: Land) -> None:
 
 
 def put(path: Path, text: str) -> None:
-    """Put a file in the place of an earlier one, for all to read: a reader sees the one or the other, whole.
+    """Put a file in the place of an earlier one (`replacing`). Raises GliderwatchError."""
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Where to write what is then put in the place of an earlier file, for all to read: a reader sees the one
+    or the other, whole.
 
     Raises GliderwatchError where it cannot be written.
     """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
+        yield part
+        with part.open("rb") as file:
             os.fsync(file.fileno())
         part.chmod(0o644)
         part.replace(path)

@@ -26,6 +26,8 @@ LIMIT = 60.0
 """Seconds that the pages of one glider, or the one of all, may take: usually below one."""
 FLEET_EVERY, GLIDER_EVERY = 600.0, 3600.0
 """Seconds after which a page is written anew without any news: countdowns, and where a glider drifts."""
+EXPORTED = 5000
+"""Dives of a glider in its table and its NetCDF file at the most: two years of them."""
 _NICENESS = 10
 
 
@@ -82,13 +84,18 @@ def write_fleet(store: Store, folder: Path, attention: dict[str, Attention], now
 
 def write_glider(store: Store, folder: Path, name: str, attention: Attention, now: float, land: Land) -> None:
     """Write what is of one glider, as known at `now` (s). Raises GliderwatchError."""
-    from gliderwatch.export import maps
+    from gliderwatch.export import dives, maps, netcdf
     from gliderwatch.pages import reading, render, writing
 
     view = reading.read_glider(store, name, attention, now)
     writing.write_glider(view, folder, land)
     writing.put(folder / render.file_of(name, ending="geojson"), maps.as_geojson((view,)))
     writing.put(folder / render.file_of(name, ending="kml"), maps.as_kml((view,)))
+    every = store.facts(name).latest_dives(EXPORTED)
+    writing.put(folder / render.file_of(name, ending="csv"), dives.as_csv(every))
+    if any(dive.lat is not None and dive.lon is not None for dive in every):
+        with writing.replacing(folder / render.file_of(name, ending="nc")) as part:
+            netcdf.write(part, name, every, now)
 
 
 class PageWriter:
