@@ -64,7 +64,7 @@ def test_pages_of_a_replay_are_written_by_command(site: Site, tmp_path: Path) ->
     command("run", "--replay", site.root, "--cache", site.cache, "--out", out)
     result = command("pages", "--state", out / "replay.sqlite", "--out", out / "pages")
     assert result.returncode == 0, result.stderr
-    assert result.stdout == f"{out}/pages/index.html: 1 gliders\n"
+    assert result.stdout == f"{out}/pages/index.html: 1 glider\n"
     page = (out / "pages" / "angus.html").read_text()
     assert "NORMAL" in page
     assert page.count("<svg") > 5

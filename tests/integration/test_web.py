@@ -210,8 +210,8 @@ def test_news_come_when_the_state_has_changed(client: TestClient, config: Config
     heard = client.portal.start_task_soon(hear)  # type: ignore[union-attr]
     acknowledge_incident(config, "electa/anomaly/1", "Bob", "", time.time())
     heard.result(timeout=20)
-    assert "taken on by Bob" not in before
-    assert "taken on by Bob" in client.get("/").text
+    assert "Bob has it" not in before
+    assert "Bob has it" in client.get("/").text
 
 
 def test_nobody_waits_for_a_page_that_is_there() -> None:

@@ -11,11 +11,18 @@ import numpy as np
 import pytest
 
 from gliderwatch.figures.coast import world
+from gliderwatch.fleet.cross_check import Fault
+from gliderwatch.health.battery import End
+from gliderwatch.health.rule import Finding
 from gliderwatch.incidents.aborts import Episode
 from gliderwatch.incidents.acknowledgement import acknowledge
-from gliderwatch.incidents.notices import AbortReport
+from gliderwatch.incidents.calls import CallsWithoutFile
+from gliderwatch.incidents.health import HealthThread
+from gliderwatch.incidents.neighbours import Comparison
+from gliderwatch.incidents.notices import AbortReport, HealthIncident
 from gliderwatch.incidents.notifications import NotificationState
 from gliderwatch.incidents.overdue import ExpectedCall
+from gliderwatch.incidents.unjudged import UnjudgedThread
 from gliderwatch.incidents.whereabouts import whereabouts
 from gliderwatch.messages.samples import SAMPLES
 from gliderwatch.model import (
@@ -30,7 +37,7 @@ from gliderwatch.model import (
     Severity,
 )
 from gliderwatch.navigation.geodesy import to_plane
-from gliderwatch.pages import writing
+from gliderwatch.pages import facts, writing
 from gliderwatch.pages.reading import SHOWN
 from gliderwatch.pages.render import Frame, file_of, fleet_page, glider_page, page_policy, sheet_page, summary
 from gliderwatch.pages.view import GliderView, verdict, worst_first
@@ -114,7 +121,7 @@ LATE = ExpectedCall(NOW - 9 * HOUR, NOW - 5 * HOUR, NOW - HOUR, 3.5 * HOUR)
         ({"incidents": (incident(cleared_at=NOW),)}, "NORMAL", "ok"),
         ({"awaited": LATE, "incidents": (incident(),)}, "OVERDUE", "bad"),
         ({"awaited": replace(LATE, due=NOW + HOUR)}, "LATE", "warn"),
-        ({"said": aborted(), "awaited": LATE}, "ABORTED", "bad"),
+        ({"notified": aborted(), "awaited": LATE}, "ABORTED", "bad"),
         ({"dives": (dive(flag=1, reason="slow"),)}, "WATCH", "warn"),
         ({"dives": (dive(flag=None, reason="no heading"),)}, "NO FLAG", "quiet"),
         ({"dives": (), "expected": None, "awaited": None}, "NO DIVE YET", "quiet"),
@@ -133,7 +140,7 @@ def test_the_fleet_is_worst_first_and_what_is_over_last():
         view(name="b-recovered", attention=Attention(recovered=True)),
         view(name="c-overdue", awaited=LATE),
         view(name="d-slow", incidents=(incident(),)),
-        view(name="e-aborted", said=aborted()),
+        view(name="e-aborted", notified=aborted()),
     )
     assert [v.name for v, _ in worst_first(views)] == [
         "e-aborted",
@@ -143,6 +150,81 @@ def test_the_fleet_is_worst_first_and_what_is_over_last():
         "b-recovered",
     ]
     assert summary([verdict(v) for v in views]) == "5 gliders: 3 in trouble"
+
+
+def found(
+    rule: str = "leak", severity: Severity = Severity.CRITICAL, *, is_over: bool = False
+) -> NotificationState:
+    finding = Finding(rule, severity, NOW - 2 * HOUR, "leak detector at 2.1 V, twice in a row below 2.3 V")
+    made = HealthIncident(
+        f"electa/health/{rule}/1",
+        "electa",
+        rule,
+        severity,
+        NOW - 2 * HOUR,
+        NOW - HOUR,
+        None,
+        finding,
+        finding,
+    )
+    return NotificationState(health=(HealthThread(made.id, made, 1, NOW - HOUR, is_over),))
+
+
+@pytest.mark.parametrize(
+    ("state", "word", "colour"),
+    [
+        (found(), "LEAK", "bad"),
+        (found("battery_end", Severity.WARNING), "BATTERY END", "warn"),
+        (found(is_over=True), "NORMAL", "ok"),
+        (NotificationState(empty=CallsWithoutFile("electa/call/1", NOW - HOUR, 3, 1)), "NO FILES", "warn"),
+        (
+            NotificationState(unknown=UnjudgedThread("electa/unknown/1", NOW - HOUR, 1, NOW)),
+            "NOT JUDGED",
+            "warn",
+        ),
+        (
+            NotificationState(neighbours=Comparison(NOW, Fault.LOSS, 3, "electa/neighbours/1", NOW)),
+            "NEIGHBOURS",
+            "warn",
+        ),
+    ],
+)
+def test_what_is_beside_the_flight_is_in_the_word_too(state, word, colour):
+    one = view(notified=state)
+    assert (verdict(one).word, verdict(one).colour) == (word, colour)
+    page = glider_page(one, Frame(NOW, NOW + 900), world())
+    assert ("Nobody has it." in page) == (word in {"LEAK", "BATTERY END", "NO FILES"})
+
+
+def test_what_goes_on_beside_the_worst_is_named_too():
+    one = view(incidents=(incident(),), notified=replace(aborted(), health=found().health))
+    page = glider_page(one, Frame(NOW, NOW + 900), world())
+    for words in (
+        "It fell out of its mission: LEAK.",
+        "anomaly since 18:43. Nobody has it.",
+        "leak since 20:13.",
+    ):
+        assert words in page, words
+    assert page.count('<rect class="bad open"') == 3  # its timeline
+
+
+def test_the_days_of_the_battery_count_from_now():
+    end = End(NOW - 86400.0, 11 * 86400.0, 8 * 86400.0, 15 * 86400.0, "battery_charge")
+    (fact,) = facts.battery(view(battery=end))
+    assert fact.text == "10 days left (7 to 14)"
+    (fact,) = facts.battery(view(battery=replace(end, latest=np.inf)))
+    assert fact.text == "10 days left (7 to more)"
+    (fact,) = facts.battery(view(battery=replace(end, left=3600.0)))
+    assert fact.text.startswith("empty since")
+
+
+def test_a_glider_that_aborted_drifts_from_its_last_fix():
+    t = NOW - HOUR / 4
+    call = Call("electa", "x.log", t, t, fix=Fix(t, 24.0, -83.0))
+    where = view(calls=(call,), notified=aborted()).whereabouts(HOUR)
+    assert where is not None
+    east, north = to_plane(where.lat, where.lon, 24.0, -83.0)
+    assert (east, north) == pytest.approx((0.1 * 4500, 0.05 * 4500), rel=0.02)
 
 
 # --------------------------------------------------------------------------- where it is
@@ -251,20 +333,21 @@ def test_no_page_asks_another_host_or_runs_what_came_in_a_file(one):
 
 def test_a_page_answers_what_a_pilot_asks():
     call = Call("electa", "x.log", NOW - 2000, NOW - 1800, fix=Fix(NOW - 1900, 24.2, -83.0), reason="leak")
-    message = SAMPLES[Kind.ANOMALY](NOW)
+    message = replace(SAMPLES[Kind.ANOMALY](NOW), incident="electa/anomaly/1")
     one = view(incidents=(incident(),), alerts=(message,), calls=(call,), waypoint=(24.5, -82.9))
     text = " ".join(" ".join(Seen(glider_page(one, Frame(NOW, NOW + 900), world())).text).split())
     for words in (
         "electa SLOW",
         "0.12 m/s through the water, normal is 0.20-0.32 m/s",
-        "nobody has taken it on",
+        "Since 18:43, 3.5 h. Nobody has it.",
+        "What to do",
         "As of 2023-11-14 22:13 UTC",
-        "The next page is due by 2023-11-14 22:28 UTC",
-        "24° 12.600' N, 083° 00.000' W",
-        "Next call 2023-11-15 01:13 UTC",
+        "stale at 22:28",
+        "24° 12.600' N, 083° 00.000' W 24.21000, -83.00000 map",
+        "Next call 15 Nov 01:13 ± 29 min",
         "in 3.0 h",
         "leak",
-        "gliderwatch ack electa/anomaly/1 --by NAME",
+        "sudo -u gliderwatch gliderwatch ack electa/anomaly/1",
         message.title,
     ):
         assert words in text, words
@@ -274,8 +357,8 @@ def test_an_acknowledgement_is_seen():
     one = incident()
     acks = {one.id: acknowledge(one, "Ann", "on it", NOW)}
     page = glider_page(view(incidents=(one,), acks=acks), Frame(NOW, NOW + 900), world())
-    assert "taken on by Ann" in page
-    assert "on it" in page
+    assert "Ann has it." in page
+    assert "Ann: on it" in page
 
 
 def test_the_pages_of_a_long_mission_stay_small():

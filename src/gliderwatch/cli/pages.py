@@ -47,10 +47,11 @@ def pages(config_path: Path | None, state: Path | None, out: Path | None, at: st
         known = store.gliders()
         names = {*known, *(config.gliders if config is not None and state is None else ())}
         attention = {n: config.attention(n) if config is not None else Attention() for n in names}
-        page_writer.write_fleet(store, folder, attention, now, land)
+        batteries = {n: page_writer.battery_limits(config, n) for n in names}
+        page_writer.write_fleet(store, folder, attention, batteries, now, land)
         for name in known:
-            page_writer.write_glider(store, folder, name, attention[name], now, land)
-    click.echo(f"{folder / 'index.html'}: {len(known)} gliders")
+            page_writer.write_glider(store, folder, name, attention[name], batteries[name], now, land)
+    click.echo(f"{folder / 'index.html'}: {len(known)} glider{'' if len(known) == 1 else 's'}")
 
 
 @click.command(epilog=example("gliderwatch web", "gliderwatch web --link electa/anomaly/1667639 --for Ann"))

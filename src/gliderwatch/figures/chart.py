@@ -43,7 +43,9 @@ STYLE = """\
 .map .land{fill:var(--land);stroke:var(--shore);stroke-width:.8}
 .map .cover{fill:var(--sea)}.map .depth{stroke:var(--shore);stroke-opacity:.45;stroke-width:.8;fill:none}
 .map .grid{stroke:var(--ink);stroke-opacity:.18;fill:none}.map .faint{
-fill-opacity:.65;font-size:10px}.map .track{fill:none;stroke:var(--quiet);stroke-width:1.5}.map .current{
+fill-opacity:.65;font-size:10px}.map .track{fill:none;stroke:var(--quiet);
+stroke-width:1.8}.map .track.ok{stroke:var(--ok)}.map .track.warn{stroke:var(--warn)}.map .track.bad{
+stroke:var(--bad);stroke-width:2.6}.map .track.quiet{stroke-dasharray:3 3}.map .current{
 stroke:var(--ok);stroke-width:1.4;fill:none}.map .area{fill:var(--warn);fill-opacity:.13;stroke:var(--warn);
 stroke-width:1.4;stroke-dasharray:5 3}.map .next{fill:var(--ok);fill-opacity:.13;stroke:var(--ok);
 stroke-width:1.4}.map .mark{stroke:var(--paper);stroke-width:1}.ok{fill:var(--ok)}.warn{fill:var(--warn)}
@@ -76,11 +78,13 @@ class Arrow:
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """What a map shows: tracks, marks, currents, and where a glider is with 95 %, each with its class
-    (`next`, `area`) and label. Coordinates in degrees."""
+    """What a map shows: tracks (each of one of `track_colours`: ok, warn, bad, quiet; without any all are
+    quiet), marks, currents, and where a glider is with 95 %, each with its class (`next`, `area`) and label.
+    Coordinates in degrees."""
 
     title: str
     tracks: tuple[tuple[Place, ...], ...] = ()
+    track_colours: tuple[str, ...] = ()
     marks: tuple[Mark, ...] = ()
     arrows: tuple[Arrow, ...] = ()
     areas: tuple[tuple[DriftEllipse, str, str], ...] = ()
@@ -176,7 +180,7 @@ def svg(chart: Chart, land: Land) -> str:
         *_depths(view, land),
         *_graticule(view),
         *(_area(view, *area) for area in chart.areas),
-        *(f'<path class="track" d="{_line(view, track)}"/>' for track in chart.tracks if len(track) > 1),
+        *_tracks(view, chart),
         *_currents(view, chart.arrows),
         *_marks(view, chart.marks),
         *_scale(view),
@@ -270,6 +274,13 @@ def _line(view: Frame, places: Iterable[Place]) -> str:
         is_jump = i > 0 and abs(x - xy[i - 1, 0]) > WIDTH  # to the other side of the date line
         parts.append(f"{'M' if i == 0 or is_jump else 'L'}{x:.1f} {y:.1f}")
     return "".join(parts)
+
+
+def _tracks(view: Frame, chart: Chart) -> Iterable[str]:
+    colours = chart.track_colours or ("quiet",) * len(chart.tracks)
+    for track, colour in zip(chart.tracks, colours, strict=True):
+        if len(track) > 1:
+            yield f'<path class="track {escape(colour)}" d="{_line(view, track)}"/>'
 
 
 def _area(view: Frame, area: DriftEllipse, kind: str, label: str) -> str:

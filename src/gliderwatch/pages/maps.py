@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gliderwatch.figures.chart import Arrow, Chart, Mark
+from gliderwatch.figures.chart import Arrow, Chart, Mark, Place
 from gliderwatch.incidents.notices import DriftEllipse
 from gliderwatch.messages.formatting import clean
 from gliderwatch.model import Assessment, Flag
@@ -19,12 +19,16 @@ SHAPES = {"bad": "triangle", "warn": "diamond", "ok": "circle", "quiet": "square
 """So that no meaning is in the colour alone."""
 
 
+_COLOURS: dict[int | None, str] = {Flag.NORMAL: "ok", Flag.ANOMALY: "bad", Flag.FALSE_ALARM: "warn"}
+"""Of a leg by the flag of its dive; one that is not judged is dashed."""
+
+
 def of_glider(view: GliderView) -> Chart:
     """Its track with flags and currents, where it is, and where it is going."""
     name = clean(view.name, 40)
     found = verdict(view)
     placed = [d for d in view.dives if d.lat is not None and d.lon is not None]
-    track = tuple((d.lat, d.lon) for d in placed if d.lat is not None and d.lon is not None)
+    colours, tracks = _legs(placed)
     marks = [mark for dive in placed if (mark := _flagged(dive)) is not None]
     if view.fix is not None:
         label = f"{name} last fix"
@@ -32,8 +36,29 @@ def of_glider(view: GliderView) -> Chart:
     if view.waypoint is not None and view.fix is not None:
         marks.append(Mark(view.waypoint, "waypoint", "cross", "quiet"))
     return Chart(
-        f"Map of {name}", (track,), tuple(marks), tuple(_arrows(placed[-ARROWS:])), tuple(_areas(view, found))
+        f"Map of {name}",
+        tracks,
+        colours,
+        tuple(marks),
+        tuple(_arrows(placed[-ARROWS:])),
+        tuple(_areas(view, found)),
     )
+
+
+def _legs(placed: list[Assessment]) -> tuple[tuple[str, ...], tuple[tuple[Place, ...], ...]]:
+    """The track as legs of dives of one flag in a row, each with its colour: from fix to fix."""
+    legs: list[tuple[str, list[Place]]] = []
+    before: Place | None = None
+    for dive in placed:
+        if dive.lat is None or dive.lon is None:
+            continue
+        place, colour = (dive.lat, dive.lon), _COLOURS.get(dive.flag, "quiet")
+        if before is not None:
+            if not legs or legs[-1][0] != colour:
+                legs.append((colour, [before]))
+            legs[-1][1].append(place)
+        before = place
+    return tuple(colour for colour, _ in legs), tuple(tuple(leg) for _, leg in legs)
 
 
 def _flagged(dive: Assessment) -> Mark | None:

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
+from gliderwatch.health.battery import End, battery_end
+from gliderwatch.health.constants import FIT, REMEMBERED
+from gliderwatch.health.readings import History, Readings
+from gliderwatch.health.rule import Limits
 from gliderwatch.incidents.acknowledgement import with_mute
 from gliderwatch.incidents.constants import RECENT
 from gliderwatch.incidents.overdue import expected_call, outlook
 from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.layers.section import Section, section
 from gliderwatch.layers.water import casts_of
+from gliderwatch.model import Incident
 from gliderwatch.pages.view import GliderView
 from gliderwatch.params import Attention
 from gliderwatch.store.state_file import Store
@@ -19,15 +26,27 @@ SHOWN = 90
 """Dives of a glider that a page shows at the most."""
 CALLS = 30 * 86400.0
 """Seconds back for which its calls are read."""
-ALERTS = 8
+ALERTS = 40
+"""Newest messages that are looked through for those of what goes on."""
 LOG = 6000
 """Bytes of the end of the log of its last call that a page shows."""
 
 
+NONE: Mapping[str, Limits | None] = MappingProxyType({})
+
+
 def read_glider(
-    store: Store, name: str, attention: Attention, now: float, *, dives: int = SHOWN, whole: bool = True
+    store: Store,
+    name: str,
+    attention: Attention,
+    now: float,
+    *,
+    dives: int = SHOWN,
+    whole: bool = True,
+    battery: Limits | None = None,
 ) -> GliderView:
-    """What a page shows of a glider at `now` (s); not `whole`: without messages and the text of its log.
+    """What a page shows of a glider at `now` (s); not `whole`: without messages, the text of its log, and
+    readings of its health. `battery` are the limits of the rule of its end; None: that is not looked at.
 
     Raises StateError where the state file cannot be read.
     """
@@ -38,29 +57,50 @@ def read_glider(
     signs = known.signs(now - RECENT) if found is None else found[1]
     awaited = None if expected is None else expected_call(expected, signs, now, attention.overdue_hours)
     calls = known.calls(now - CALLS) if known.last_log() is not None else ()
-    call = calls[-1] if calls else None
+    calls = tuple(call for call in calls if call.began <= now)
+    readings = store.health.readings(name, now - (REMEMBERED if whole else FIT), now)
     return GliderView(
         name=name,
         now=now,
-        dives=known.latest_dives(dives),
-        incidents=known.incidents(),
+        dives=tuple(dive for dive in known.latest_dives(dives) if dive.t_surface <= now),
+        incidents=tuple(_as_of(i, now) for i in known.incidents() if i.opened_at <= now),
         acks=store.notes.acks(name),
         attention=attention,
         expected=expected,
         awaited=awaited,
-        calls=calls[-20:],
+        calls=calls,
         log=_tail(known.last_log()) if whole else "",
-        alerts=known.latest_alerts(ALERTS) if whole else (),
-        said=store.notified(name),
-        waypoint=call.waypoint if call is not None else None,
+        alerts=tuple(a for a in known.latest_alerts(ALERTS) if a.time <= now) if whole else (),
+        notified=store.notified(name),
+        waypoint=calls[-1].waypoint if calls else None,
+        readings=readings if whole else {},
+        battery=_battery_end(readings, battery),
     )
 
 
+def _as_of(incident: Incident, now: float) -> Incident:
+    """An incident as it was at a time (s): one that was cleared later went on."""
+    is_later = incident.cleared_at is not None and incident.cleared_at > now
+    return replace(incident, cleared_at=None) if is_later else incident
+
+
+def _battery_end(readings: Readings, limits: Limits | None) -> End | None:
+    return None if limits is None or not readings else battery_end(History((), readings), limits)
+
+
 def read_fleet(
-    store: Store, names: list[str], attention: Callable[[str], Attention], now: float, dives: int = 1
+    store: Store,
+    names: list[str],
+    attention: Callable[[str], Attention],
+    now: float,
+    dives: int = 1,
+    batteries: Mapping[str, Limits | None] = NONE,
 ) -> tuple[GliderView, ...]:
     """What the page of the fleet shows of each glider."""
-    return tuple(read_glider(store, name, attention(name), now, dives=dives, whole=False) for name in names)
+    return tuple(
+        read_glider(store, name, attention(name), now, dives=dives, whole=False, battery=batteries.get(name))
+        for name in names
+    )
 
 
 def read_section(store: Store, name: str, segments: int) -> tuple[Section, tuple[LayerAdvice, ...]]:

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import re
 from base64 import b64encode
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 from importlib.resources import files
-from math import isfinite
+from types import MappingProxyType
 from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, pass_context
@@ -18,22 +18,24 @@ from jinja2.runtime import Context
 from markupsafe import Markup
 
 from gliderwatch import __version__
-from gliderwatch.figures import chart, dives, plots
+from gliderwatch.figures import chart, dives, health, panel_svg, timeline
 from gliderwatch.figures.coast import Land
-from gliderwatch.messages import formatting
-from gliderwatch.messages.formatting import INCIDENTS, clean, duration, flow, map_link, place, utc
-from gliderwatch.model import Assessment, Flag, Kind
-from gliderwatch.pages import maps
+from gliderwatch.figures.plots import Panel
+from gliderwatch.figures.timeline import Bar
+from gliderwatch.messages.formatting import clean, duration, flow, utc
+from gliderwatch.model import Assessment, Flag, Severity
+from gliderwatch.pages import facts, maps
+from gliderwatch.pages.call_log import call_log, transferred
 from gliderwatch.pages.view import GliderView, Verdict, verdict, worst_first
 
 DAY = 86400.0
+NOTHING: Mapping[str, str] = MappingProxyType({})
 ROWS = 15
 """Dives in the table of a page."""
-TEXT = 12_000
-"""Characters of one text (a message, a log) at the most: a page stays small whatever comes."""
-MARKED = re.compile(r"abort|error|warning|leak|oddit|emergenc|undervolt|overdepth|GliderDOS", re.IGNORECASE)
-"""Lines of a log that are shown first."""
-MOST_MARKED = 15
+MESSAGES = 8
+"""Of the last messages, that a page shows by their titles."""
+PAST = 14 * DAY
+"""Seconds back that the timeline of the fleet shows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,17 +47,6 @@ class Frame:
     due: float
     live: str = ""
     warning: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Fact:
-    """A labelled line: with the time until it (s), a link to a map, or a picture."""
-
-    label: str
-    text: str
-    t: float | None = None
-    link: str = ""
-    picture: Markup | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,11 +77,20 @@ def fleet_page(views: tuple[GliderView, ...], frame: Frame, land: Land) -> str:
     ranked = worst_first(views)
     links = {view.name: _href(file_of(view.name)) for view, _ in ranked}
     cards = [
-        {"name": clean(v.name, 40), "verdict": f, "link": links[v.name], "facts": _short(v)}
+        {
+            "name": clean(v.name, 40),
+            "verdict": f,
+            "since": facts.since(v),
+            "link": links[v.name],
+            "facts": facts.of_card(v),
+        }
         for v, f in ranked
     ]
     picture = Markup(chart.svg(maps.of_fleet(ranked, links), land))
-    return _render("fleet.html", frame, cards=cards, map=picture, summary=summary([f for _, f in ranked]))
+    bars = [bar for view, found in ranked if found.rank >= 0 for bar in _bars(view, by_glider=True)]
+    past = Markup(timeline.svg("Timeline of all gliders", bars, frame.now - PAST, frame.now))
+    found = summary([f for _, f in ranked])
+    return _render("fleet.html", frame, cards=cards, map=picture, timeline=past, summary=found)
 
 
 def summary(found: Sequence[Verdict]) -> str:
@@ -102,28 +102,31 @@ def summary(found: Sequence[Verdict]) -> str:
     return f"{many}: {', '.join(parts)}" if parts else f"{many}, nothing to do"
 
 
-def glider_page(view: GliderView, frame: Frame, land: Land) -> str:
-    """The page of one glider."""
-    message, *older = view.alerts or (None,)
-    lines = view.log.splitlines()
-    marked = [clean(line, 160) for line in lines if MARKED.search(line)][-MOST_MARKED:]
+def glider_page(view: GliderView, frame: Frame, land: Land, take_on: Mapping[str, str] = NOTHING) -> str:
+    """The page of one glider; `take_on` has the links by which what goes on can be taken on, by its id, and
+    that by which the glider is muted, by its name."""
+    found = verdict(view)
+    span = _span(view)
+    past = timeline.svg(f"Timeline of {clean(view.name, 40)}", list(_bars(view)), *span)
     return _render(
         "glider.html",
         frame,
         name=clean(view.name, 40),
-        verdict=verdict(view),
+        verdict=found,
+        since=facts.since(view),
+        page=_href(file_of(view.name)),
         sheet=_href(file_of(view.name, "-sheet")),
-        facts=_facts(view),
-        message=message,
-        messages=older,
-        open=view.open,
+        facts=facts.of_glider(view),
+        message=facts.actions(view),
+        messages=[facts.message_of(alert) for alert in view.alerts[:MESSAGES]],
+        open=[(m, take_on.get(m.id, "")) for m in view.open_matters if m.can_be_taken_on],
+        mute=take_on.get(view.name, ""),
         map=Markup(chart.svg(maps.of_glider(view), land)),
-        plots=_plots(view.dives),
+        plots=_plots(view, span),
         calls=tuple(reversed(view.calls[-5:])),
-        marked="\n".join(marked),
-        log="\n".join(clean(line, 300) for line in lines)[-TEXT:],
-        incidents=tuple(reversed(view.incidents))[:ROWS],
-        acks=view.acks,
+        log=call_log(view.log, view.calls[-1] if view.calls else None),
+        timeline=Markup(past),
+        matters=tuple(reversed(view.matters))[:ROWS],
         rows=tuple(reversed(view.dives[-ROWS:])),
     )
 
@@ -132,21 +135,23 @@ def sheet_page(view: GliderView, frame: Frame, land: Land) -> str:
     """One page to print, of the last day of a glider that is known."""
     end = view.now if view.latest is None else min(view.now, view.latest.t_surface + DAY)
     some = tuple(d for d in view.dives if d.t_surface > end - DAY)
-    speed = dives.speed(some) if any(d.speed is not None for d in some) else None
-    recent = (i for i in view.incidents if i.cleared_at is None or i.cleared_at > end - DAY)
+    span = (end - DAY, end)
+    drawn = [panel for panel in dives.panels(some)[:1] if panel.name == "Speed"] if len(some) > 1 else []
+    found = verdict(view)
     return _render(
         "sheet.html",
         frame,
         name=clean(view.name, 40),
-        verdict=verdict(view),
+        verdict=found,
+        since=facts.since(view),
         page=_href(file_of(view.name)),
-        facts=_facts(view),
+        facts=facts.of_glider(view),
+        message=facts.actions(view),
         day=_day(some),
         map=Markup(chart.svg(maps.of_glider(view), land)),
-        plot=None if speed is None else _plot(speed),
-        rows=tuple(reversed(some))[:24],
-        incidents=tuple(recent),
-        acks=view.acks,
+        plots=[_plot(panel, span) for panel in drawn],
+        rows=tuple(reversed(some))[:12],
+        matters=tuple(m for m in reversed(view.matters) if m.over is None or m.over > end - DAY),
     )
 
 
@@ -161,110 +166,33 @@ def _day(some: Sequence[Assessment]) -> str:
     return f"{len(some)} dives in 24 h, {hours:.1f} h under water, {flagged} flagged."
 
 
-def _plots(some: Sequence[Assessment]) -> list[Plot]:
-    return [_plot(panel) for panel in dives.panels(some)] if len(some) > 1 else []
+def _span(view: GliderView) -> tuple[float, float]:
+    """The first and the last time (s) of the plots of a glider: the same for all, so that they compare."""
+    start = view.dives[0].t_dive if view.dives else view.now - PAST
+    return start, max(view.now if not view.is_over else view.last_sign or view.now, start + DAY)
 
 
-def _plot(panel: plots.Panel) -> Plot:
-    return Plot(panel.name, panel.shows, Markup(plots.svg(panel)))
+def _plots(view: GliderView, span: tuple[float, float]) -> list[Plot]:
+    made = dives.panels(view.dives) if len(view.dives) > 1 else []
+    ours = health.panels(view.readings, view.battery, view.calls)
+    names = {panel.name for panel in ours}
+    panels = [*(panel for panel in made if panel.name not in names), *ours]
+    return [plot for panel in panels if (plot := _plot(panel, span)).svg]
 
 
-# ----------------------------------------
-# The facts of a glider, in the order in which a pilot asks for them.
+def _plot(panel: Panel, span: tuple[float, float]) -> Plot:
+    if panel.name == "Battery" and len(panel.lines) > 1:  # it ends in the future
+        span = (span[0], max(span[1], float(panel.lines[1].t[-1])))
+    return Plot(panel.name, panel.shows, Markup(panel_svg.svg(panel, span)))
 
 
-def _short(view: GliderView) -> list[Fact]:
-    """Those of its card on the page of the fleet."""
-    return [*_incidents(view), *_last_call(view), *_next_call(view), *_last_dive(view), *_muted(view)]
-
-
-def _last_dive(view: GliderView) -> list[Fact]:
-    if view.latest is None:
-        return []
-    facts = [Fact("Speed", _speed(view.latest), picture=bullet(view.latest))]
-    return facts if view.flow is None else [*facts, Fact("Current", flow(*view.flow))]
-
-
-def _facts(view: GliderView) -> list[Fact]:
-    """Those of its own page."""
-    now, fix = view.whereabouts(), view.fix
-    facts = [*_incidents(view), *_muted(view), *_last_call(view)]
-    if fix is not None:
-        facts += [
-            Fact("Last fix", f"{place(fix.lat, fix.lon)}, {utc(fix.t)}", link=map_link(fix.lat, fix.lon))
-        ]
-    facts += _next_call(view)
-    if now is not None and fix is not None and view.now > fix.t:
-        facts += [Fact("Now about", f"{place(now.lat, now.lon)}, 95 % within {now.major / 1000:.1f} km")]
-    if view.waypoint is not None:
-        facts += [Fact("Waypoint", place(*view.waypoint))]
-    return [*facts, *_last_dive(view)]
-
-
-def _last_call(view: GliderView) -> list[Fact]:
-    if view.heard is None:
-        return []
-    why = clean(view.calls[-1].reason, 80) if view.calls else ""
-    return [Fact("Last heard", utc(view.heard) + (f", {why}" if why else ""), view.heard)]
-
-
-def _next_call(view: GliderView) -> list[Fact]:
-    call, e = view.awaited, view.expected
-    if call is None or view.is_over or view.attention.recovered:
-        return []
-    sure = f" ± {duration(1.96 * e.t_sigma)}" if e is not None and e.t == call.t else ""
-    facts = [Fact("Next call", f"{utc(call.t)}{sure}", call.t)]
-    if e is not None and e.t == call.t and e.lat is not None:
-        facts += [Fact("There", place(e.lat, e.lon), link=map_link(e.lat, e.lon))]
-    return facts
-
-
-def _incidents(view: GliderView) -> list[Fact]:
-    facts = []
-    for i in view.open:
-        ack = view.acks.get(i.id)
-        who = "nobody has taken it on" if ack is None else f"taken on by {clean(ack.by, 40)}"
-        if ack is not None and not ack.holds(i):
-            who += ", WORSE SINCE"
-        facts.append(Fact("Incident", f"{INCIDENTS.get(i.kind, str(i.kind))} since {utc(i.since)}; {who}"))
-    return facts
-
-
-def _muted(view: GliderView) -> list[Fact]:
-    until = view.attention.muted_until
-    return [Fact("Muted", f"until {utc(until)}")] if until is not None and until > view.now else []
-
-
-def _speed(dive: Assessment) -> str:
-    sigma = dive.evidence.get("speed_sigma")
-    error = "" if sigma is None else f" ± {sigma:.2f}"
-    return f"{formatting.speed(dive.speed)}{error}, normal {dive.speed_min:.2f}-{dive.speed_max:.2f}"
-
-
-def bullet(dive: Assessment) -> Markup | None:
-    """The speed of a dive against its normal range, as a bullet chart."""
-    if dive.speed is None or not isfinite(dive.speed):
-        return None
-    top = 1.25 * max(dive.speed_max, dive.speed, 1e-3)
-    low, high, at = (200 * max(x, 0.0) / top for x in (dive.speed_min, dive.speed_max, dive.speed))
-    is_out = not dive.speed_min <= dive.speed <= dive.speed_max
-    colour = "bad" if is_out else "ok"
-    sigma = 200 * dive.evidence.get("speed_sigma", 0.0) / top
-    label = f"{dive.speed:.2f} m/s of {dive.speed_min:.2f} to {dive.speed_max:.2f}"
-    return Markup(
-        '<svg class="bullet" viewBox="0 0 200 14" role="img" aria-label="{label}">'
-        '<rect class="range" x="{low:.1f}" y="1" width="{width:.1f}" height="12"/>'
-        '<rect class="{colour}" x="0" y="5" width="{at:.1f}" height="4"/>'
-        '<rect class="{colour}" x="{left:.1f}" y="6.5" width="{both:.1f}" height="1"/></svg>'
-    ).format(
-        label=label,
-        low=low,
-        width=high - low,
-        colour=colour,
-        at=at,
-        left=max(at - sigma, 0.0),
-        both=2 * sigma,
-    )
+def _bars(view: GliderView, *, by_glider: bool = False) -> Iterator[Bar]:
+    """What needed somebody, as bars of a timeline: a row a glider, or one a kind."""
+    for m in view.matters:
+        until = "now" if m.over is None else utc(m.over)
+        words = f"{clean(view.name, 40)} {m.word}, {utc(m.since)} to {until}"
+        row = clean(view.name, 40) if by_glider else m.word
+        yield Bar(row, m.since, m.over, "bad" if m.severity is Severity.CRITICAL else "warn", words)
 
 
 # ----------------------------------------
@@ -286,10 +214,6 @@ def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.2f}"
 
 
-def _incident(kind: Kind) -> str:
-    return INCIDENTS.get(kind, str(kind))
-
-
 def part(name: str) -> str:
     """The style or the script that is in every page."""
     return files("gliderwatch.pages").joinpath("templates", name).read_text(encoding="utf-8")
@@ -309,7 +233,7 @@ def policy(texts: Iterable[str], scripts: Iterable[str]) -> str:
 
 @cache
 def _style() -> str:
-    return part("style.css") + chart.STYLE
+    return part("style.css") + chart.STYLE + panel_svg.STYLE + timeline.STYLE
 
 
 def page_policy() -> str:
@@ -324,6 +248,11 @@ def _from_now(context: Context, t: float) -> str:
     return f"{apart} ago" if t < now else f"in {apart}"
 
 
+@pass_context
+def _near(context: Context, t: float) -> str:
+    return facts.near(t, context["frame"].now)
+
+
 @cache
 def _environment() -> Environment:
     made = Environment(
@@ -334,7 +263,14 @@ def _environment() -> Environment:
         loader=PackageLoader("gliderwatch.pages"),
     )
     made.filters.update(
-        utc=utc, clean=clean, flag=_flag, flow=_flow, number=_number, incident=_incident, from_now=_from_now
+        utc=utc,
+        clean=clean,
+        flag=_flag,
+        flow=_flow,
+        number=_number,
+        from_now=_from_now,
+        near=_near,
+        files=transferred,
     )
     made.globals.update(
         version=__version__,

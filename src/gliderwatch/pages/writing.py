@@ -10,6 +10,7 @@ from pathlib import Path
 
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.figures.coast import Land
+from gliderwatch.health.rule import Limits
 from gliderwatch.pages.reading import read_fleet
 from gliderwatch.pages.render import Frame, file_of, fleet_page, glider_page, sheet_page
 from gliderwatch.pages.view import GliderView
@@ -23,9 +24,16 @@ LEFT_OVER = 3600.0
 """Seconds after which what a killed writer left is removed."""
 
 
-def write_fleet(store: Store, folder: Path, attention: dict[str, Attention], now: float, land: Land) -> None:
+def write_fleet(
+    store: Store,
+    folder: Path,
+    attention: dict[str, Attention],
+    batteries: dict[str, Limits | None],
+    now: float,
+    land: Land,
+) -> None:
     """Write the page of all gliders, those of `attention`. Raises GliderwatchError where that cannot be."""
-    views = read_fleet(store, sorted(attention), lambda name: attention[name], now)
+    views = read_fleet(store, sorted(attention), lambda name: attention[name], now, batteries=batteries)
     put(folder / FLEET, fleet_page(views, Frame(now, now + FLEET_DUE), land))
 
 

@@ -13,6 +13,9 @@ from typing import TYPE_CHECKING
 import structlog
 
 from gliderwatch.config import Config
+from gliderwatch.health.battery import END
+from gliderwatch.health.rule import Limits
+from gliderwatch.health.rules import usual_limits
 from gliderwatch.params import Attention
 from gliderwatch.service.drawing import DrawingProcess
 
@@ -33,12 +36,14 @@ _NICENESS = 10
 
 @dataclass(frozen=True, slots=True)
 class PageJob:
-    """What is to be written: the pages of a ``glider``, or, where that is empty, the one of all; with maps of
-    the files ``maps``."""
+    """What is to be written: the pages of a ``glider``, or, where that is empty, the one of all, with maps of
+    the files ``maps``. By glider: how its silence is taken, and the limits of its battery (None: that is not
+    looked at)."""
 
     state: Path
     folder: Path
     attention: dict[str, Attention] = field(default_factory=dict)
+    batteries: dict[str, Limits | None] = field(default_factory=dict)
     glider: str = ""
     maps: tuple[str, ...] = ()
 
@@ -59,9 +64,10 @@ def write(job: PageJob) -> str:
     try:
         with store.guarded():
             if job.glider:
-                write_glider(store, job.folder, job.glider, job.attention[job.glider], now, land)
+                name, limits = job.glider, job.batteries.get(job.glider)
+                write_glider(store, job.folder, name, job.attention[name], limits, now, land)
             else:
-                write_fleet(store, job.folder, job.attention, now, land)
+                write_fleet(store, job.folder, job.attention, job.batteries, now, land)
     finally:
         store.close()
     return reason
@@ -71,23 +77,44 @@ def write(job: PageJob) -> str:
 # Nothing that draws is loaded in the daemon, which imports this module too.
 
 
-def write_fleet(store: Store, folder: Path, attention: dict[str, Attention], now: float, land: Land) -> None:
+def battery_limits(config: Config | None, glider: str) -> Limits | None:
+    """The limits of a glider's battery: as configured, else the usual ones; None where that rule is off."""
+    limits = usual_limits() if config is None else config.health(glider)
+    return limits.get(END.name)
+
+
+def write_fleet(
+    store: Store,
+    folder: Path,
+    attention: dict[str, Attention],
+    batteries: dict[str, Limits | None],
+    now: float,
+    land: Land,
+) -> None:
     """Write what is of all gliders, those of `attention`, as known at `now` (s). Raises GliderwatchError."""
     from gliderwatch.export import maps
     from gliderwatch.pages import render, writing
 
     writing.clear(folder, now)
-    writing.write_fleet(store, folder, attention, now, land)
+    writing.write_fleet(store, folder, attention, batteries, now, land)
     links = [render.file_of(name, ending="kml") for name in store.gliders()]
     writing.put(folder / "gliders.kml", maps.as_kml_link(links))
 
 
-def write_glider(store: Store, folder: Path, name: str, attention: Attention, now: float, land: Land) -> None:
+def write_glider(
+    store: Store,
+    folder: Path,
+    name: str,
+    attention: Attention,
+    battery: Limits | None,
+    now: float,
+    land: Land,
+) -> None:
     """Write what is of one glider, as known at `now` (s). Raises GliderwatchError."""
     from gliderwatch.export import dives, maps, netcdf
     from gliderwatch.pages import reading, render, writing
 
-    view = reading.read_glider(store, name, attention, now)
+    view = reading.read_glider(store, name, attention, now, battery=battery)
     writing.write_glider(view, folder, land)
     writing.put(folder / render.file_of(name, ending="geojson"), maps.as_geojson((view,)))
     writing.put(folder / render.file_of(name, ending="kml"), maps.as_kml((view,)))
@@ -143,9 +170,11 @@ class PageWriter:
         del self._waiting[name]
         self._written[name] = monotonic
         if not name or name in gliders:
-            attention = {each: config.attention(each) for each in ([name] if name else names)}
+            some = [name] if name else names
+            attention = {each: config.attention(each) for each in some}
+            batteries = {each: battery_limits(config, each) for each in some}
             state, folder = Path(config.state.path), Path(config.pages.folder)
-            self._begin(PageJob(state, folder, attention, name, config.maps.files))
+            self._begin(PageJob(state, folder, attention, batteries, name, config.maps.files))
 
     @property
     def is_idle(self) -> bool:

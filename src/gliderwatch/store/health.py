@@ -12,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 
 from gliderwatch.health.constants import REMEMBERED, REPORTED
-from gliderwatch.health.readings import History, Readings, recent
+from gliderwatch.health.readings import History, Readings, joined, recent
 from gliderwatch.health.rule import Finding, Limits
 from gliderwatch.health.rules import Judged, judge
 from gliderwatch.model import Array, Series, readonly
@@ -65,6 +65,15 @@ class HealthRows:
                 judged = judge(History(recent(known[: k + 1]), known[k][1]), limits)
                 found = (codec.plain_encode(judged), source)
                 self._db.execute("UPDATE health SET judged = ? WHERE source = ?", found)
+
+    def readings(self, glider: str, since: float, until: float) -> Readings:
+        """All readings of a glider from segments and calls of a time (s), joined by quantity."""
+        if not has_table(self._db, "health"):
+            return {}  # a state file of an earlier release, which may be looked at
+        sql = "SELECT readings FROM health WHERE glider = ? AND t BETWEEN ? AND ? ORDER BY t, source"
+        rows = [_unpacked(row[0]) for row in self._db.execute(sql, (glider, since, until))]
+        names = sorted({name for row in rows for name in row})
+        return MappingProxyType({n: joined([row[n] for row in rows if n in row]) for n in names})
 
     def judged(self, glider: str) -> tuple[tuple[float, Judged], ...]:
         """What the rules found in each segment and call of the last weeks, in order of time (s)."""

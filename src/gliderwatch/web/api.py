@@ -22,7 +22,7 @@ def glider(view: GliderView) -> Json:
         "sentence": found.sentence,
         "since": _time(found.since),
         "as_of": iso_ms(view.now),
-        "heard": _time(view.heard),
+        "heard": _time(view.last_sign),
         "fix": None if fix is None else {"t": iso_ms(fix.t), "lat": fix.lat, "lon": fix.lon},
         "now": None
         if now is None

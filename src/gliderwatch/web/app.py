@@ -26,12 +26,14 @@ from gliderwatch.errors import GliderwatchError
 from gliderwatch.export import maps
 from gliderwatch.export.dives import assessment_line
 from gliderwatch.figures.map_files import land_or_world
+from gliderwatch.health.rule import Limits
 from gliderwatch.messages.formatting import clean
 from gliderwatch.pages import render
 from gliderwatch.pages.reading import read_fleet, read_glider
 from gliderwatch.pages.render import Frame
 from gliderwatch.pages.view import GliderView, worst_first
 from gliderwatch.service.liveness import STALE, is_held, seconds_silent
+from gliderwatch.service.page_writer import battery_limits
 from gliderwatch.store.state_file import Store
 from gliderwatch.web import api
 from gliderwatch.web.cache import PageCache, stamp_of
@@ -81,7 +83,8 @@ class Site:
                 for name in store.gliders():
                     for kind, page in (("", render.glider_page), ("-sheet", render.sheet_page)):
                         if path == render.file_of(name, kind):
-                            view = read_glider(store, name, self.config.attention(name), frame.now)
+                            attention, battery = self.config.attention(name), self._battery(name)
+                            view = read_glider(store, name, attention, frame.now, battery=battery)
                             return page(view, frame, land_or_world(self.config.maps.files)[0])
         finally:
             store.close()
@@ -93,9 +96,13 @@ class Site:
         try:
             with store.guarded():
                 names = sorted({*self.config.gliders, *store.gliders()})
-                return read_fleet(store, names, self.config.attention, now, dives)
+                batteries = {name: self._battery(name) for name in names}
+                return read_fleet(store, names, self.config.attention, now, dives, batteries)
         finally:
             store.close()
+
+    def _battery(self, name: str) -> Limits | None:
+        return battery_limits(self.config, name)
 
     async def look(self) -> None:
         """Have pages made anew when there is news, and tell who looks at them; for ever."""
@@ -119,8 +126,9 @@ def _site(request: Request) -> Site:
 async def page(request: Request) -> Response:
     """A page of the fleet or of a glider."""
     path = request.path_params.get("file", "index.html")
+    pages = _site(request).pages
     try:
-        text = await run_in_threadpool(_site(request).pages.get, path)
+        text = pages.held(path) or await run_in_threadpool(pages.get, path)
     except KeyError:
         raise HTTPException(404, "There is no such page.") from None
     return HTMLResponse(text, headers={"Cache-Control": "no-cache"})

@@ -48,18 +48,24 @@ class PageCache:
         self._pages: dict[str, _Page] = {}
         self._drawing = threading.Lock()
 
+    def held(self, path: str) -> str | None:
+        """A page that is there; None where it has to be made first. At once: for the thread that answers."""
+        page, now = self._pages.get(path), self._clock()
+        if page is None or now - page.made >= 2 * self._keep(path):
+            return None
+        page.asked = now
+        return page.text
+
     def get(self, path: str) -> str:
-        """A page. Raises what `make` raises, KeyError where there is no such page."""
-        page = self._pages.get(path)
-        now = self._clock()
-        if page is not None and now - page.made < 2 * self._keep(path):
-            page.asked = now
-            return page.text
+        """A page, made if need be. Raises what `make` raises, KeyError where there is no such page."""
+        before = self._pages.get(path)
+        if (text := self.held(path)) is not None:
+            return text
         with self._drawing:
             again = self._pages.get(path)
-            if again is not None and again is not page:
+            if again is not None and again is not before:
                 return again.text  # somebody else made it meanwhile
-            return self._anew(path, now).text
+            return self._anew(path, self._clock()).text
 
     def refresh(self) -> bool:
         """Make those anew that somebody looks at and that are out of date; whether there were any."""
