@@ -38,7 +38,7 @@ def drawing(folder: Path, *, limit: float = LIMIT, **options: object) -> MailPic
 def sent(pictures: MailPictures, post: Post, message: Alert) -> float:
     """Send a message; how long it took (s)."""
     begun = time.monotonic()
-    Channel("mail", post.url(), pictures).send(message)
+    Channel("mail", post.url(), pictures, pictures=True).send(message)
     return time.monotonic() - begun
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from gliderwatch.config import Config, Problem, expand
-from gliderwatch.delivery.channels import Channel, DeliveryError
+from gliderwatch.delivery.channels import DeliveryError
 from gliderwatch.errors import ConfigError, DamagedError, GliderwatchError, MissingCache, StateError
 from gliderwatch.messages import notice_text
 from gliderwatch.messages.formatting import clean, duration
@@ -408,7 +408,7 @@ def sample_for(kind: str) -> Alert:
 def try_channel(config: Config, name: str, alert: Alert | None = None) -> str | None:
     """Send a test message, or an `alert`; why it was not delivered, None when it was."""
     try:
-        Channel(name, config.channel_url(name).get_secret_value()).send(alert or _test(name, time.time()))
+        config.channel(name).send(alert or _test(name, time.time()))
     except (DeliveryError, ConfigError) as problem:
         return str(problem)
     return None
@@ -428,7 +428,7 @@ def _test(name: str, now: float) -> Alert:
 def _reached(config: Config, name: str) -> tuple[str, str | None]:
     """What is known of a channel to which nothing is sent, and why it cannot be used (None: it can)."""
     try:
-        answers = Channel(name, config.channel_url(name).get_secret_value()).reach()
+        answers = config.channel(name).reach()
     except (DeliveryError, ConfigError) as problem:
         return "", str(problem)
     return "has a server that answers" if answers else "has a good URL (tried only with --send)", None

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import UnionType
-from typing import Any, get_args, get_origin
+from typing import TYPE_CHECKING, Any, get_args, get_origin
 
 from pydantic import Field, PrivateAttr, SecretStr, TypeAdapter, ValidationError
 
@@ -35,6 +35,9 @@ from gliderwatch.config.schema import (
 from gliderwatch.errors import ConfigError
 from gliderwatch.health.rule import Limits
 from gliderwatch.params import Attention, GliderParams
+
+if TYPE_CHECKING:
+    from gliderwatch.delivery import channels as delivery
 
 # ----------------------------------------
 # The whole of the settings, and the parameters of each glider that follow from them.
@@ -115,6 +118,17 @@ class Config(Section):
         except ConfigError as error:
             raise ConfigError(f"{self._document.path}:{self.locate(key)}: {key}: {error}") from None
         return SecretStr(url)
+
+    def channel(self, name: str, illustrator: delivery.Illustrator | None = None) -> delivery.Channel:
+        """A channel by which messages can be sent, its mails with pictures where there is who draws them;
+        every option of its section goes to it by name.
+
+        Raises `ConfigError` as `channel_url`.
+        """
+        from gliderwatch.delivery import channels  # noqa: PLC0415 (most commands send nothing)
+
+        options = self.channels[name].model_dump(exclude={"url"})
+        return channels.Channel(name, self.channel_url(name).get_secret_value(), illustrator, **options)
 
     def _of(self, name: str) -> Settings:
         """The settings of a glider, put together once: they are asked for with every file."""

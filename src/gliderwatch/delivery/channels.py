@@ -63,13 +63,16 @@ class Illustrator(Protocol):
 
 
 class Channel:
-    """One way to reach people; its mails have the pictures of an `illustrator`. Not for use by several
-    threads at once."""
+    """One way to reach people, by its URL and the options of its section in the configuration, with
+    ``pictures`` by an `illustrator`. Not for use by several threads at once."""
 
-    def __init__(self, name: str, url: str, illustrator: Illustrator | None = None) -> None:
+    def __init__(
+        self, name: str, url: str, illustrator: Illustrator | None = None, *, pictures: bool = False
+    ) -> None:
         self.name = name
+        self._settings = url, pictures
         self._url = url
-        self._illustrator = illustrator
+        self._illustrator = illustrator if pictures else None
         self._service: Any = None
         self._mail: MailServer | None = None
         self._accepted: dict[str, set[str]] = {}
@@ -77,6 +80,10 @@ class Channel:
 
     def __repr__(self) -> str:
         return f"Channel({self.name!r})"
+
+    def is_as(self, other: Channel) -> bool:
+        """Whether another channel has the same name and settings."""
+        return (self.name, self._settings) == (other.name, other._settings)
 
     def prepare(self) -> None:
         """Load Apprise and read the URL, so that the first alert need not wait for it.

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gliderwatch.config import Config, expand
-from gliderwatch.delivery.channels import Channel
 from gliderwatch.delivery.dispatcher import Dispatcher
 from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine, Retry
 from gliderwatch.export.dives import alert_line, assessment_line, write_lines
@@ -180,7 +179,7 @@ def _delivery(request: Request, path: Path | str, report: Report) -> Iterator[Ro
         yield NOBODY if request.config is None else _silent(request.config)
         return
     config, wake = request.config, threading.Event()
-    channels = {n: Channel(n, config.channel_url(n).get_secret_value()) for n in config.channels}
+    channels = {name: config.channel(name) for name in config.channels}
     outbox = Path(path)
     dispatcher = Dispatcher(lambda: Outbox(outbox), channels, time.time, wake)
     dispatcher.start()

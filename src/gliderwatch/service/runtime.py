@@ -6,7 +6,7 @@ import signal
 import threading
 import time
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
@@ -103,8 +103,7 @@ News = Change | Decoded | PagesWritten | signal.Signals
 
 @dataclass(frozen=True, slots=True)
 class Runtime:
-    """A configuration and what works by it. ``urls`` (with their secrets) tell whether channels changed;
-    ``pictures`` draws those of mails."""
+    """A configuration and what works by it; ``pictures`` draws those of mails."""
 
     config: Config
     news: SimpleQueue[News]
@@ -118,8 +117,8 @@ class Runtime:
     dispatcher: Dispatcher
     ocean: OceanCache
     fields: tuple[FleetField, ...]
+    channels: dict[str, Channel]
     pictures: MailPictures
-    urls: dict[str, str] = field(repr=False)
 
     def start(self, before: Runtime | None = None) -> None:
         """Begin to work, in place of the parts before."""
@@ -150,6 +149,27 @@ class Runtime:
         self.news.put(Decoded(self.backlog, job, future))
 
 
+def _send_alike(before: Runtime, config: Config, channels: dict[str, Channel]) -> bool:
+    """Whether messages go out as they did before: by channels that are as they were, with the same links, and
+    maps of the same files."""
+    return (
+        before.config.web.public_url == config.web.public_url
+        and before.config.maps.files == config.maps.files
+        and before.channels.keys() == channels.keys()
+        and all(channel.is_as(before.channels[name]) for name, channel in channels.items())
+    )
+
+
+def _dispatcher(
+    config: Config, channels: dict[str, Channel], state: Path, wake: threading.Event
+) -> Dispatcher:
+    """What sends messages by some channels, with links where the configuration has a public address."""
+    senders: dict[str, Sender] = dict(channels)
+    if config.web.public_url is not None:
+        senders = links.linked(senders, str(config.web.public_url), state)
+    return Dispatcher(lambda: Outbox(state), senders, time.time, wake)
+
+
 def build(
     config: Config,
     news: SimpleQueue[News],
@@ -165,21 +185,14 @@ def build(
     configuration is read again is then not sent a second time. Their decoder goes on always, with its worker
     processes.
     """
-    urls = {name: config.channel_url(name).get_secret_value() for name in config.channels}
-    public = config.web.public_url
-    if before is not None and before.urls == urls and _sends_as(before.config, config):
-        dispatcher, pictures = before.dispatcher, before.pictures
+    state = Path(config.state.path)
+    pictures = MailPictures(state, config.attention, time.time, config.maps.files)
+    channels = {name: config.channel(name, pictures) for name in config.channels}
+    if before is not None and _send_alike(before, config, channels):
+        dispatcher, channels, pictures = before.dispatcher, before.channels, before.pictures
         pictures.attention = config.attention
     else:
-        state = Path(config.state.path)
-        pictures = MailPictures(state, config.attention, time.time, config.maps.files)
-        channels: dict[str, Sender] = {
-            name: Channel(name, url, pictures if config.channels[name].pictures else None)
-            for name, url in urls.items()
-        }
-        if public is not None:
-            channels = links.linked(channels, str(public), state)
-        dispatcher = Dispatcher(lambda: Outbox(state), channels, time.time, wake)
+        dispatcher = _dispatcher(config, channels, state, wake)
     watcher = Watcher(
         config.dockserver.roots,
         {name: glider.paths for name, glider in config.gliders.items()},
@@ -205,19 +218,9 @@ def build(
         dispatcher,
         ocean,
         fields_of(config),
+        channels,
         pictures,
-        urls,
     )
     decoder.science = wants_science(config)
     decoder.cache_folders = parts.cache_folders()
     return parts
-
-
-def _sends_as(before: Config, config: Config) -> bool:
-    """Whether messages have the same links and pictures by two configurations."""
-
-    def sends(each: Config) -> tuple[object, ...]:
-        with_pictures = {name for name, channel in each.channels.items() if channel.pictures}
-        return each.web.public_url, with_pictures, each.maps.files
-
-    return sends(before) == sends(config)
