@@ -118,3 +118,6 @@ MOTORS = Rule(
     ),
     "Ballast, oil, battery position and fin: measured against commanded.",
 )
+
+RULES = (ALTITUDE, ROLL, MOTORS)
+"""In the order in which they are shown."""

@@ -213,3 +213,6 @@ END = Rule(
     ),
     "When the battery ends, by the use of the last days; held against the planned `recovery`.",
 )
+
+RULES = (VOLTS, CHARGE, END)
+"""In the order in which they are shown."""

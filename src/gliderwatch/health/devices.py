@@ -142,3 +142,6 @@ CUT_CALLS = Rule(
     (Limit("part", 50, "%", 0, 100, "More of the last ten calls cut is a warning.", 0.01),),
     "Calls that end while a file is sent.",
 )
+
+RULES = (DEVICES, MISSION_TIME, MEMORY, FIX, CUT_CALLS)
+"""In the order in which they are shown."""

@@ -179,3 +179,6 @@ SLOW_LEAK = Rule(
     "The trend of the vacuum, by the density of the gas in the hull, at depth and at the surface apart.",
     clear_after=CLEAR_TREND_AFTER,
 )
+
+RULES = (LEAK, DIGIFIN, VACUUM, SLOW_LEAK)
+"""In the order in which they are shown."""

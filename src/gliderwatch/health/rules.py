@@ -8,23 +8,7 @@ from gliderwatch.health import attitude, battery, devices, leaks
 from gliderwatch.health.readings import History
 from gliderwatch.health.rule import Finding, Limits, Rule
 
-RULES: tuple[Rule, ...] = (
-    leaks.LEAK,
-    leaks.DIGIFIN,
-    leaks.VACUUM,
-    leaks.SLOW_LEAK,
-    battery.VOLTS,
-    battery.CHARGE,
-    battery.END,
-    devices.DEVICES,
-    devices.MISSION_TIME,
-    devices.MEMORY,
-    devices.FIX,
-    devices.CUT_CALLS,
-    attitude.ALTITUDE,
-    attitude.ROLL,
-    attitude.MOTORS,
-)
+RULES: tuple[Rule, ...] = (*leaks.RULES, *battery.RULES, *devices.RULES, *attitude.RULES)
 """In the order in which they are shown."""
 
 Judged = Mapping[str, Finding | None]
