@@ -29,6 +29,7 @@ from gliderwatch.cli.doctor_checks import (
     warning,
 )
 from gliderwatch.config import load
+from gliderwatch.delivery import channels
 from gliderwatch.service.liveness import PidLock, alive_path
 from gliderwatch.service.preconditions import check
 from gliderwatch.slocum.folders import find_places, scan
@@ -499,7 +500,7 @@ def test_a_test_message_goes_through_each_channel_only_when_asked(
     examined: Doctor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sent: list[str] = []
-    monkeypatch.setattr(doctor_checks.Channel, "send", lambda self, alert: sent.append(self.name))
+    monkeypatch.setattr(channels.Channel, "send", lambda self, alert: sent.append(self.name))
     assert examined() == []
     assert sent == []
     assert examined(send=True) == []
@@ -508,7 +509,7 @@ def test_a_test_message_goes_through_each_channel_only_when_asked(
     def refuse(*_: object) -> None:
         raise doctor_checks.DeliveryError("550 no")
 
-    monkeypatch.setattr(doctor_checks.Channel, "send", refuse)
+    monkeypatch.setattr(channels.Channel, "send", refuse)
     assert one(examined(send=True), Level.ERROR, "channels", "550 no")
 
 
@@ -516,7 +517,7 @@ def test_the_server_of_a_mail_channel_is_asked_without_sending(
     examined: Doctor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sent: list[str] = []
-    monkeypatch.setattr(doctor_checks.Channel, "send", lambda self, alert: sent.append(self.name))
+    monkeypatch.setattr(channels.Channel, "send", lambda self, alert: sent.append(self.name))
     text = TEXT.replace("json://127.0.0.1:1/x", "'mailto://127.0.0.1:9?from=a@b.org&to=c@d.org'")
     assert one(examined(text), Level.ERROR, "channels", "hook cannot be used: mail server 127.0.0.1:9")
     assert sent == []
