@@ -14,16 +14,8 @@ import msgspec
 
 from gliderwatch.estimation.dive_measurement import are_apart
 from gliderwatch.estimation.glider import Estimate, step
-from gliderwatch.forecast.outlook import look_ahead
-from gliderwatch.forecast.surfacing import (
-    Surfacings,
-    WaypointLog,
-    active_waypoint,
-    expect,
-    ground,
-    learn,
-    read_waypoints,
-)
+from gliderwatch.forecast.outlook import after_dive
+from gliderwatch.forecast.surfacing import Surfacings, WaypointLog, read_waypoints
 from gliderwatch.incidents.state_machine import RuleStates, advance, end_all
 from gliderwatch.model import Assessment, Dive, Incident, NextSurfacing, Segment
 from gliderwatch.navigation.dives import Navigation, extend
@@ -103,8 +95,7 @@ def process(
             incidents |= changed
             settled = memory
         last = dive
-        waypoint = active_waypoint(waypoints, dive.end.t)
-        memory, assessment, opened = _after(settled, dive, waypoint, params, key, ocean)
+        memory, assessment, opened = _after(settled, dive, waypoints, params, key, ocean)
         changed = {i.id: i for i in opened}
         assessments[dive.t_dive] = assessment
     since = state.last.t_dive if state.last is not None else float("-inf")
@@ -120,7 +111,7 @@ def process(
 def _after(
     before: Memory,
     dive: Dive,
-    waypoint: tuple[float, float] | None,
+    waypoints: WaypointLog,
     params: GliderParams,
     key: str,
     ocean: Field | None,
@@ -134,7 +125,7 @@ def _after(
     frozen = bool(before.rules.open())
     estimate, assessment = step(before.estimate, dive, params, key, frozen, ocean)
     rules, changed = advance(before.rules, assessment, params.rules)
-    surfacings = learn(before.surfacings, dive, waypoint, before.expected)
-    outlook = look_ahead(estimate, ground(dive))
-    expected = None if outlook is None else expect(surfacings, *outlook, params.surfacing_hours)
+    surfacings, expected = after_dive(
+        before.surfacings, dive, waypoints, estimate, before.expected, params.surfacing_hours
+    )
     return Memory(estimate, rules, surfacings, expected), assessment, over + changed

@@ -1,4 +1,4 @@
-"""What the estimator of a glider expects of its next dive: speed and flow. Pure."""
+"""What a glider is expected to do after a dive: its speed, the flow, and the next surfacing by them. Pure."""
 
 from __future__ import annotations
 
@@ -11,14 +11,41 @@ from gliderwatch.estimation.dive_measurement import OWN, SLIP
 from gliderwatch.estimation.glider import Estimate
 from gliderwatch.estimation.kalman import JointParams, JointState, expected_flow
 from gliderwatch.forecast.constants import VAGUE
-from gliderwatch.forecast.surfacing import Flow
-from gliderwatch.model import Array
+from gliderwatch.forecast.surfacing import (
+    Flow,
+    Surfacings,
+    WaypointLog,
+    active_waypoint,
+    expect,
+    ground,
+    learn,
+)
+from gliderwatch.model import Array, Dive, NextSurfacing
 from gliderwatch.sea.gauss_markov import FlowParams
 
 Outlook = tuple[float, float, Flow]
 """Speed through the water and its standard error (m/s), and the forecast of the flow."""
 PHYSICAL = JointParams().slip * DRAG_BY_LIFT / sin(USUAL_PITCH) ** 2
 """Part of the own speed that the angle of attack takes at the usual pitch, beside the slip of the state."""
+
+
+def after_dive(
+    before: Surfacings,
+    dive: Dive,
+    waypoints: WaypointLog,
+    estimate: Estimate,
+    expected: NextSurfacing | None,
+    hours: float | None,
+) -> tuple[Surfacings, NextSurfacing | None]:
+    """What is learnt of how a glider surfaces from a dive that ended, and the next surfacing by it.
+
+    ``waypoints`` are those read so far, ``estimate`` is that after the dive, ``expected`` the surfacing that
+    was expected of it; ``hours`` between surfacings, where the settings say so.
+    """
+    waypoint = None if dive.end is None else active_waypoint(waypoints, dive.end.t)
+    surfacings = learn(before, dive, waypoint, expected)
+    outlook = look_ahead(estimate, ground(dive))
+    return surfacings, None if outlook is None else expect(surfacings, *outlook, hours)
 
 
 def look_ahead(estimate: Estimate, over_ground: Array | None) -> Outlook | None:

@@ -78,17 +78,13 @@ def process_file(
     """
     glider = segment.id.glider
     with store.transaction():
-        store.record_sign(segment.id, segment.last_t, now)
-        held = store.segments.completeness(segment.id)
-        if held is not None and held >= segment.completeness:
+        if not store.segments.is_fuller(segment):
             file = replace(file, status=Status.DUPLICATE, reason="this segment is known from a fuller copy")
-            store.record(file, now)
+            store.receive(file, segment.id, segment.last_t, now)
             return FileOutcome(file, alerts=_due_messages(store, glider, params, routing, now))
         file = replace(file, status=Status.TAKEN, reason="")
-        store.record(file, now)
+        store.receive(file, segment.id, segment.last_t, now)
         assessments, state = _run(store, segment, params, stopping, ocean, layers)
-        right = moved(segment, store.segments.offset(segment.id))  # by a clock that is right
-        store.health.put(glider, right.id.name, right.last_t, of_segment(right))
         if fields:
             take(store, fields, store.segments.kept(segment.id))
         advice = look(store, fields, glider, state) if fields and routing is not None else ()
@@ -106,9 +102,10 @@ def record_file(
     It is a sign of life all the same, if its header tells of what.
     """
     with store.transaction():
-        store.record(file, now)
         if file.opened_at is not None and file.status != Status.UNKNOWN:
-            store.record_sign(SegmentId(file.opened_at, file.glider, file.segment), None, now)
+            store.receive(file, SegmentId(file.opened_at, file.glider, file.segment), None, now)
+        else:
+            store.record(file, now)
         alerts = _due_messages(store, file.glider, params, routing, now) if file.glider else ()
     return FileOutcome(file, alerts=alerts)
 
@@ -221,23 +218,23 @@ def _run(
     ocean: Field | None,
     layers: GliderLayers | None,
 ) -> tuple[tuple[Assessment, ...], GliderState]:
-    segments = store.segments
-    state, todo = segments.resume(segments.put(segment))
+    state, todo, offset = store.segments.place(segment)
+    right = moved(segment, offset)  # by a clock that is right
+    store.health.put(segment.id.glider, right.id.name, right.last_t, of_segment(right))
     dives: dict[float, Assessment] = {}
     for identity in todo:
         if stopping():
             raise StoppedError(f"{segment.id.name} was not taken in: the daemon ends")
-        one = segment if identity == segment.id else segments.get(identity)
+        one = segment if identity == segment.id else store.segments.get(identity)
         outcome = _process(state, one, params, ocean)
-        store.apply(identity.glider, outcome)
-        segments.checkpoint(identity, outcome.state)
+        store.keep(identity, outcome)
         if layers is not None:
             layers_of_sea.take(store, identity, layers)
         state = outcome.state
         dives = {t: a for t, a in dives.items() if t < outcome.since} | {
             a.t_dive: a for a in outcome.assessments
         }
-    segments.thin(segment.id.glider)
+    store.segments.thin(segment.id.glider)
     return tuple(dives.values()), state
 
 
@@ -292,7 +289,7 @@ def _due_messages(
 ) -> tuple[Alert, ...]:
     if routing is None:
         return ()
-    store.health.judge(glider, routing.limits(glider))
+    rows = store.health.judge(glider, routing.limits(glider))
     attention = with_mute(routing.attention(glider), store.notes.muted_until(glider))
     if attention.is_quiet(now):
         withdraw_answered(store, glider, now, quiet=True)
@@ -316,7 +313,7 @@ def _due_messages(
     notified, of_fleet = _compare(store, notified, last, params, attention.neighbours)
     acks, reminder_hours = store.notes.acks(glider), params.rules.reminder_hours
     notified, of_calls = _due_of_calls(notified, facts, acks, reminder_hours, now)
-    rows, fix = store.health.judged(glider), facts.last_fix(now - GONE)
+    fix = facts.last_fix(now - GONE) if rows else None
     threads, of_health = health.announce(notified.health, glider, rows, fix, acks, reminder_hours)
     notified = replace(notified, health=threads)
     due = (*of_silences, *of_files, *of_incidents, *of_watch, *of_fleet, *of_calls, *of_health)

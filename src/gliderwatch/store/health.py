@@ -49,10 +49,14 @@ class HealthRows:
         )
         self._db.execute("UPDATE health SET judged = NULL WHERE glider = ? AND t >= ?", (glider, since))
 
-    def judge(self, glider: str, limits: Mapping[str, Limits]) -> None:
-        """Judge by ``limits`` what is to be judged: once for all files that came together."""
-        if not limits:
-            return
+    def judge(self, glider: str, limits: Mapping[str, Limits]) -> tuple[tuple[float, Judged], ...]:
+        """Judge by ``limits`` what is to be judged, once for all files that came together; all that was found
+        (`judged`)."""
+        if limits:
+            self._judge(glider, limits)
+        return self.judged(glider)
+
+    def _judge(self, glider: str, limits: Mapping[str, Limits]) -> None:
         sql = "SELECT min(t) FROM health WHERE glider = ? AND judged IS NULL"
         since: float | None = self._db.execute(sql, (glider,)).fetchone()[0]
         if since is None:

@@ -49,10 +49,12 @@ class MissionClocks:
         """Know nothing: what is in the state file is another than it was."""
         self._clocks.clear()
 
-    def correct(self, glider: str, name: str, stamp: Stamp) -> dict[SegmentId, SegmentId]:
-        """Put the segments of a mission where they belong in time, after one was put there under this name;
-        the ids before and after of those moved."""
-        mission = numbered(name)[0]
+    def correct(self, identity: SegmentId, last_t: float) -> dict[SegmentId, SegmentId]:
+        """Put the segments of a mission where they belong in time, after one was put there by its own clock,
+        which has its last sample at ``last_t`` (s); the ids before and after of those moved."""
+        glider, name = identity.glider, identity.name
+        mission, number = numbered(name)
+        stamp = Stamp(number, identity.opened_at, last_t)
         clock = self._clocks.get((glider, mission))
         new = None if clock is None else clock.next(stamp)
         if clock is None or new is None:
@@ -66,8 +68,7 @@ class MissionClocks:
         return {before: after}
 
     def _correct_all(self, glider: str, mission: str) -> dict[SegmentId, SegmentId]:
-        rows = _rows(self._db, glider, mission)
-        stamps = [_stamp(row) for row in rows]
+        rows, stamps = _rows(self._db, glider, mission)
         found = corrections(stamps, _start(rows))
         self._clocks.pop((glider, mission), None)
         if (clock := mission_clock(stamps, found)) is not None:
@@ -89,19 +90,19 @@ class MissionClocks:
         clock = self._clocks.get((identity.glider, mission))
         if clock is not None and (found := clock.next(own)) is not None:
             return found.offset
-        rows = [row for row in _rows(self._db, identity.glider, mission) if row["name"] != identity.name]
-        return corrections([own, *map(_stamp, rows)], _start(rows))[0].offset
+        rows, stamps = _rows(self._db, identity.glider, mission, but=identity.name)
+        return corrections([own, *stamps], _start(rows))[0].offset
 
 
-def _rows(db: sqlite3.Connection, glider: str, mission: str) -> list[sqlite3.Row]:
-    """The segments of a mission in the order of their numbers."""
-    sql = f"SELECT {_COLUMNS} FROM segments WHERE {_OF_MISSION}"
-    rows = db.execute(sql, (glider, *_names(mission))).fetchall()
-    return sorted(rows, key=lambda row: numbered(row["name"])[1])
-
-
-def _stamp(row: sqlite3.Row) -> Stamp:
-    return Stamp(numbered(row["name"])[1], row["opened_at"] - row["clock_offset"], row["last_t"])
+def _rows(
+    db: sqlite3.Connection, glider: str, mission: str, but: str = ""
+) -> tuple[list[sqlite3.Row], list[Stamp]]:
+    """The segments of a mission in the order of their numbers, without those of one name; their stamps."""
+    sql = f"SELECT {_COLUMNS} FROM segments WHERE {_OF_MISSION} AND name != ?"
+    rows = db.execute(sql, (glider, *_names(mission), but)).fetchall()
+    numbers = {row["name"]: numbered(row["name"])[1] for row in rows}
+    rows.sort(key=lambda row: numbers[row["name"]])
+    return rows, [Stamp(numbers[r["name"]], r["opened_at"] - r["clock_offset"], r["last_t"]) for r in rows]
 
 
 def _correction(row: sqlite3.Row) -> Correction:
@@ -219,6 +220,11 @@ class Segments:
         row = self._held(identity)
         return codec.plain_decode(row["completeness"], tuple[int, int, str]) if row is not None else None
 
+    def is_fuller(self, segment: Segment) -> bool:
+        """Whether a copy of a segment holds more than the one that is held, or none is."""
+        held = self.completeness(segment.id)
+        return held is None or held < segment.completeness
+
     def offset(self, identity: SegmentId) -> float:
         """What is to be added to the glider's clock (s) in a segment that is held."""
         row = self._held(identity)
@@ -238,6 +244,12 @@ class Segments:
             (identity.glider, identity.name, identity.opened_at, SAME_OPENING),
         ).fetchone()
         return row
+
+    def place(self, segment: Segment) -> tuple[GliderState, list[SegmentId], float]:
+        """Keep a segment (`put`); the state to go on from, the ids of the segments that are to be processed
+        from there on, and what is to be added to its times (s)."""
+        state, after = self.resume(self.put(segment))
+        return state, after, self.offset(segment.id)
 
     def put(self, segment: Segment) -> SegmentId:
         """Keep a segment in place of an earlier copy; the first id in time that this touches.
@@ -268,8 +280,7 @@ class Segments:
                 codec.encode(thinned),
             ),
         )
-        stamp = Stamp(numbered(name)[1], segment.id.opened_at, segment.last_t)
-        moves = self.clocks.correct(glider, name, stamp)
+        moves = self.clocks.correct(segment.id, segment.last_t)
         here = SegmentId(segment.id.opened_at + correction.offset, glider, name)
         return min([moves.pop(here, here), *touched, *moves, *moves.values()])
 

@@ -147,6 +147,11 @@ class Store:
         row = (f.path, f.size, f.mtime_ns, f.status, f.glider, f.segment, f.reason, f.crc, now, why)
         self._db.execute("INSERT OR REPLACE INTO files VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
 
+    def receive(self, file: File, identity: SegmentId, last_t: float | None, now: float) -> None:
+        """Write what became of a file of a segment, and that it is a sign of life (`record_sign`)."""
+        self.record(file, now)
+        self.record_sign(identity, last_t, now)
+
     # --------------------------------------------------------------- retention
 
     def is_past(self, identity: SegmentId) -> bool:
@@ -177,6 +182,11 @@ class Store:
             "INSERT OR REPLACE INTO incidents VALUES (?, ?, ?, ?, ?)",
             [(i.id, glider, i.opened_at, i.cleared_at, codec.plain_encode(i)) for i in outcome.incidents],
         )
+
+    def keep(self, identity: SegmentId, outcome: Outcome) -> None:
+        """Keep the outcome of a segment: its results (`apply`), and the state after it."""
+        self.apply(identity.glider, outcome)
+        self.segments.checkpoint(identity, outcome.state)
 
     def record_sign(self, identity: SegmentId, last_t: float | None, now: float) -> None:
         """Note a sign of life: a file of a segment came, with its last sample (s) if it was read; by the
