@@ -4,7 +4,9 @@
 
 A remora is simulated and its files are replayed. Of the one file that opens the incident every call between
 functions of gliderwatch is counted once: a crossing is a call from a function of one package to one of
-another (`gliderwatch.store` to `gliderwatch.messages`, say; modules beside the packages count as one).
+another (`gliderwatch.store` to `gliderwatch.messages`, say; modules beside the packages count as one). Those
+to methods of the values that all rooms share (`model.py`: the length of a series, say) lead to no other room;
+the second number is without them.
 """
 
 from __future__ import annotations
@@ -110,7 +112,11 @@ def run() -> None:
     functions = {code for edge in trace.opening for code in edge}
     crossings = [edge for edge in trace.opening if package(edge[0]) != package(edge[1])]
     between = Counter((package(a) or "(top)", package(b) or "(top)") for a, b in crossings)
-    print(f"functions {len(functions)}, calls {len(trace.opening)}, crossings {len(crossings)}")
+    rooms = [(a, b) for a, b in crossings if Path(b.co_filename).name != "model.py"]
+    print(
+        f"functions {len(functions)}, calls {len(trace.opening)}, crossings {len(crossings)}, "
+        f"{len(rooms)} of them not to a value of model.py"
+    )
     for (a, b), n in between.most_common():
         print(f"  {a} -> {b}: {n}")
     if arguments.edges:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from gliderwatch.health import attitude, battery, devices, leaks
-from gliderwatch.health.readings import History
+from gliderwatch.health.readings import History, Readings, recent
 from gliderwatch.health.rule import Finding, Limits, Rule
 
 RULES: tuple[Rule, ...] = (*leaks.RULES, *battery.RULES, *devices.RULES, *attitude.RULES)
@@ -22,6 +22,17 @@ def judge(history: History, limits: Mapping[str, Limits]) -> Judged:
         for rule in RULES
         if rule.name in limits and rule.sees(history)
     }
+
+
+def judge_rows(
+    rows: Sequence[tuple[float, Readings]], since: float, limits: Mapping[str, Limits]
+) -> list[Judged]:
+    """What the rules find in each file and call from a time (s) on; `rows` are all so far, in order of time."""
+    return [
+        judge(History(recent(rows[: k + 1]), readings), limits)
+        for k, (t, readings) in enumerate(rows)
+        if t >= since
+    ]
 
 
 def usual_limits(recovery: float | None = None) -> dict[str, Limits]:

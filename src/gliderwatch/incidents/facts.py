@@ -23,13 +23,19 @@ class Facts(Protocol):
         """The last dive that has ended with a fix and surfaced at `until` (s) or before."""
 
 
+def last_dives(facts: Facts, n: int) -> list[Assessment]:
+    """The last `n` dives that have ended with a fix, the newest first."""
+    dives, until = list[Assessment](), math.inf
+    while len(dives) < n and (dive := facts.last_surfacing(until)) is not None:
+        dives.append(dive)
+        until = dive.t_surface - 1.0
+    return dives
+
+
 def situation(facts: Facts, incident: str = "") -> Situation:
     """The last dives, the next surfacing, and the open incidents but the one of an id."""
-    latest = dive = facts.last_surfacing(math.inf)
-    speeds: list[float | None] = []
-    while dive is not None and len(speeds) < TREND_DIVES:
-        speeds.insert(0, dive.speed)
-        dive = facts.last_surfacing(dive.t_surface - 1.0)
+    dives = last_dives(facts, TREND_DIVES)
+    latest, speeds = dives[0] if dives else None, [dive.speed for dive in reversed(dives)]
     others = tuple(i for i in facts.incidents() if i.id != incident and i.cleared_at is None)
     expected = None if latest is None else next_surfacing(facts, latest)
     return Situation(latest, tuple(speeds), expected, others)

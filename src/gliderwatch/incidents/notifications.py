@@ -13,7 +13,7 @@ from gliderwatch.incidents.aborts import Episode
 from gliderwatch.incidents.acknowledgement import Acks, is_acknowledged
 from gliderwatch.incidents.calls import SEVERAL, CallsWithoutFile
 from gliderwatch.incidents.constants import FLOW_CHANGE, NEWS, REGIME_DIVES, SPEED_CHANGE
-from gliderwatch.incidents.facts import Facts, next_surfacing, situation
+from gliderwatch.incidents.facts import Facts, last_dives, next_surfacing, situation
 from gliderwatch.incidents.health import HealthThread
 from gliderwatch.incidents.neighbours import Comparison
 from gliderwatch.incidents.notices import (
@@ -144,12 +144,7 @@ def _new_regime(
 
     Files may have come together: it is looked for among the last `REGIME_DIVES`.
     """
-    dives = [latest]
-    for _ in range(REGIME_DIVES):
-        earlier = facts.last_surfacing(dives[-1].t_surface - 1.0)
-        if earlier is None:
-            break
-        dives.append(earlier)
+    dives = last_dives(facts, 1 + REGIME_DIVES)
     for k, dive in enumerate(dives):
         before = dive.evidence.get("usual_before")
         if renewed is not None and dive.t_dive <= renewed:

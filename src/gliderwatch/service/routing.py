@@ -109,12 +109,26 @@ def post_alerts(
     channels: Channels,
     now: float,
 ) -> None:
-    """Keep messages about a glider, and that they have been sent to people.
+    """Keep messages about a glider, and that people were notified, as `post_due`."""
+    open_threads = unacknowledged(notified, store.facts(glider).incidents(), store.notes.acks(glider))
+    post_due(store, glider, notified, open_threads, alerts, channels, now)
 
-    What is held of incidents that are over by then is withdrawn (`withdraw_answered`).
+
+def post_due(
+    store: Store,
+    glider: str,
+    notified: NotificationState,
+    open_threads: frozenset[str],
+    alerts: Iterable[Alert],
+    channels: Channels,
+    now: float,
+) -> None:
+    """Keep messages about a glider, and that people were ``notified``.
+
+    What is held until it escalates is withdrawn, but for ``open_threads``: what is open and nobody has
+    acknowledged.
     """
-    store.keep_notified(glider, notified)
-    open_threads = withdraw_answered(store, glider, now)
+    store.keep_notified(glider, notified, open_threads, now)
     for alert in alerts:
         post_alert(store, alert, channels(alert), now, open_threads)
 

@@ -8,15 +8,14 @@ from math import inf
 
 from gliderwatch.errors import GliderwatchError, NotAssessed
 from gliderwatch.fleet.constants import CHECK_WINDOW
-from gliderwatch.fleet.cross_check import cross_check, current_of
+from gliderwatch.fleet.cross_check import current_of
 from gliderwatch.fleet.flow import DiveCurrent
 from gliderwatch.health.readings import of_call, of_segment
-from gliderwatch.incidents import aborts, health, irregularities, neighbours, overdue, unjudged
-from gliderwatch.incidents import calls as without_files
-from gliderwatch.incidents.acknowledgement import Acks, with_mute
-from gliderwatch.incidents.constants import GONE
-from gliderwatch.incidents.notices import Fleet, Notice
-from gliderwatch.incidents.notifications import NotificationState, due_notifications
+from gliderwatch.incidents import overdue
+from gliderwatch.incidents.acknowledgement import with_mute
+from gliderwatch.incidents.due import Findings, Wanted, due
+from gliderwatch.incidents.notices import Fleet
+from gliderwatch.incidents.notifications import NotificationState
 from gliderwatch.incidents.send_schedule import AT_ONCE, Wait
 from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.messages.notice_text import render
@@ -28,10 +27,9 @@ from gliderwatch.sea.ocean_field import Field
 from gliderwatch.service import layers as layers_of_sea
 from gliderwatch.service.fields import FieldAdvice, FleetField, look, take
 from gliderwatch.service.layers import GliderLayers
-from gliderwatch.service.routing import Routing, post_alerts, withdraw_answered
+from gliderwatch.service.routing import Routing, post_alerts, post_due, withdraw_answered
 from gliderwatch.slocum.calls import Dialog
 from gliderwatch.store.codec import plain_encode
-from gliderwatch.store.results import GliderFacts
 from gliderwatch.store.state_file import File, Status, Store
 
 
@@ -247,39 +245,6 @@ def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: 
         raise NotAssessed(f"cannot be assessed, please report it ({segment.id.name}: {what})") from error
 
 
-def _due_of_calls(
-    notified: NotificationState, facts: GliderFacts, acks: Acks, reminder_hours: float | None, now: float
-) -> tuple[NotificationState, list[Notice]]:
-    """The notices that are due of what a glider reported in its calls."""
-    calls = facts.calls(now - GONE)
-    episodes, notices = aborts.announce(facts.glider, notified.aborts, calls, now, acks, reminder_hours)
-    signs = facts.signs(now - GONE) if calls else ()
-    empty, more = without_files.announce(facts.glider, notified.empty, calls, signs, now, acks)
-    return replace(notified, aborts=episodes, empty=empty), [*notices, *more]
-
-
-def _compare(
-    store: Store, notified: NotificationState, last: Assessment | None, params: GliderParams, wanted: bool
-) -> tuple[NotificationState, list[Notice]]:
-    """The notices that are due of a glider beside its neighbours, where that is wanted: once for each
-    surfacing, by what was measured until then. Only a glider that is compared with its own currents
-    (`reference: dac`) has them in its assessments.
-    """
-    before = notified.neighbours
-    if not wanted or last is None or params.reference != "dac":
-        return notified, []
-    if before is not None and before.checked >= last.t_surface:
-        return notified, []
-    currents = list[DiveCurrent]()
-    for glider in store.gliders():
-        dives = store.surfaced_between(glider, last.t_surface - CHECK_WINDOW, last.t_surface)
-        each = map(current_of, dives, [None, *dives])
-        currents += [current for current in each if current is not None]
-    check = cross_check(currents, last.glider)
-    compared, notices = neighbours.announce(last.glider, before, check, last.t_surface)
-    return replace(notified, neighbours=compared), notices
-
-
 def _due_messages(
     store: Store,
     glider: str,
@@ -287,37 +252,48 @@ def _due_messages(
     routing: Routing | None,
     now: float,
 ) -> tuple[Alert, ...]:
+    """Make the messages that are due of a glider; none while `routing` is None, or while it is muted."""
     if routing is None:
         return ()
-    rows = store.health.judge(glider, routing.limits(glider))
+    judged = store.health.judge(glider, routing.limits(glider))
     attention = with_mute(routing.attention(glider), store.notes.muted_until(glider))
     if attention.is_quiet(now):
         withdraw_answered(store, glider, now, quiet=True)
         return ()
-    before, facts = store.notified(glider), store.facts(glider)
-    last = facts.last_surfacing(inf)
-    advice = store.fields.advice(glider, last.t_surface) if last is not None else []
-    silences, of_silences = overdue.on_calls(before.silences, facts, now)
-    notified, of_incidents = due_notifications(
-        replace(before, silences=silences),
-        facts,
-        params.rules.reminder_hours,
-        routing.notices(glider),
-        store.notes.acks(glider),
-        tuple((field, each) for field, _, each in advice),
-        None if last is None else layers_of_sea.newest(store, glider, last.t_dive - LAST_ADVICE),
-    )
-    blind, of_watch = unjudged.announce(notified.unknown, facts, attention, params.rules.reminder_hours, now)
-    ids, of_files = irregularities.due(before.irregularities, facts.irregularities(now), now)
-    notified = replace(notified, unknown=blind, irregularities=ids)
-    notified, of_fleet = _compare(store, notified, last, params, attention.neighbours)
-    acks, reminder_hours = store.notes.acks(glider), params.rules.reminder_hours
-    notified, of_calls = _due_of_calls(notified, facts, acks, reminder_hours, now)
-    fix = facts.last_fix(now - GONE) if rows else None
-    threads, of_health = health.announce(notified.health, glider, rows, fix, acks, reminder_hours)
-    notified = replace(notified, health=threads)
-    due = (*of_silences, *of_files, *of_incidents, *of_watch, *of_fleet, *of_calls, *of_health)
-    alerts = tuple(map(render, due))
-    if notified != before or alerts:
-        post_alerts(store, glider, notified, alerts, _channels(store, before.silences, routing), now)
+    before, facts, surfacings = store.notified(glider), store.facts(glider), routing.notices(glider)
+    wanted = Wanted(store.notes.acks(glider), attention, params.rules.reminder_hours, surfacings)
+    found = Findings(judged)
+    if surfacings:
+        found = _with_advice(store, glider, found)
+    if attention.neighbours and params.reference == "dac":
+        found = replace(found, currents=_currents(store, glider, before))
+    what = due(before, facts, wanted, found, now)
+    alerts = tuple(map(render, what.notices))
+    if what.notified != before or alerts:
+        channels = _channels(store, before.silences, routing)
+        post_due(store, glider, what.notified, what.open_threads, alerts, channels, now)
     return alerts
+
+
+def _with_advice(store: Store, glider: str, found: Findings) -> Findings:
+    """What was found, with the advice for the next dive: it is in the notice of a surfacing."""
+    last = store.facts(glider).last_surfacing(inf)
+    if last is None:
+        return found
+    advice = tuple((field, each) for field, _, each in store.fields.advice(glider, last.t_surface))
+    layers = layers_of_sea.newest(store, glider, last.t_dive - LAST_ADVICE)
+    return replace(found, advice=advice, layers=layers)
+
+
+def _currents(store: Store, glider: str, notified: NotificationState) -> list[DiveCurrent] | None:
+    """The currents of all gliders about the last surfacing of one, None where it was compared already. Only
+    gliders that are compared with their own currents (`reference: dac`) have them in their assessments."""
+    last, before = store.facts(glider).last_surfacing(inf), notified.neighbours
+    if last is None or (before is not None and before.checked >= last.t_surface):
+        return None
+    currents = list[DiveCurrent]()
+    for other in store.gliders():
+        dives = store.surfaced_between(other, last.t_surface - CHECK_WINDOW, last.t_surface)
+        each = map(current_of, dives, [None, *dives])
+        currents += [current for current in each if current is not None]
+    return currents

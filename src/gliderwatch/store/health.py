@@ -12,9 +12,9 @@ from types import MappingProxyType
 import numpy as np
 
 from gliderwatch.health.constants import REMEMBERED, REPORTED
-from gliderwatch.health.readings import History, Readings, joined, recent
+from gliderwatch.health.readings import Readings, joined
 from gliderwatch.health.rule import Finding, Limits
-from gliderwatch.health.rules import Judged, judge
+from gliderwatch.health.rules import Judged, judge_rows
 from gliderwatch.model import Array, Series, readonly
 from gliderwatch.store import codec
 from gliderwatch.store.database import has_table
@@ -63,12 +63,12 @@ class HealthRows:
             return
         sql = "SELECT t, source, readings FROM health WHERE glider = ? AND t >= ? ORDER BY t, source"
         rows = self._db.execute(sql, (glider, since - REMEMBERED)).fetchall()
-        known = [(t, _unpacked(data)) for t, _, data in rows]
-        for k, (t, source, _) in enumerate(rows):
-            if t >= since:
-                judged = judge(History(recent(known[: k + 1]), known[k][1]), limits)
-                found = (codec.plain_encode(judged), source)
-                self._db.execute("UPDATE health SET judged = ? WHERE source = ?", found)
+        found = judge_rows([(t, _unpacked(data)) for t, _, data in rows], since, limits)
+        sources = [source for t, source, _ in rows if t >= since]
+        self._db.executemany(
+            "UPDATE health SET judged = ? WHERE source = ?",
+            [(codec.plain_encode(each), source) for each, source in zip(found, sources, strict=True)],
+        )
 
     def readings(self, glider: str, since: float, until: float) -> Readings:
         """All readings of a glider from segments and calls of a time (s), joined by quantity."""

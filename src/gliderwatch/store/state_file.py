@@ -259,9 +259,14 @@ class Store:
         row = self._db.execute("SELECT data FROM said WHERE glider = ?", (glider,)).fetchone()
         return codec.plain_decode(row[0], NotificationState) if row is not None else NotificationState()
 
-    def keep_notified(self, glider: str, said: NotificationState) -> None:
-        """Keep what people have been told of a glider."""
-        self._db.execute("INSERT OR REPLACE INTO said VALUES (?, ?)", (glider, codec.plain_encode(said)))
+    def keep_notified(
+        self, glider: str, notified: NotificationState, open_threads: Collection[str], now: float
+    ) -> None:
+        """Keep what people were notified of about a glider, and withdraw what is held of it but for some
+        threads (`withdraw`)."""
+        row = (glider, codec.plain_encode(notified))
+        self._db.execute("INSERT OR REPLACE INTO said VALUES (?, ?)", row)
+        self.withdraw(glider, open_threads, now)
 
     def post(self, alert: Alert, channels: Iterable[str], now: float) -> None:
         """Keep one message and put it into the outbox of its channels, as `outbox.post`."""
