@@ -72,7 +72,7 @@ def state_of(path: Path, gliders: int, dives: int, now: float) -> list[str]:
             for one in flown:
                 store.health.put(name, one.segment, one.t_surface, readings(one.t_surface, chance))
             store.apply(name, Outcome(GliderState(), float("-inf"), flown, (), expected))
-            store.keep_notified(name, NotificationState())
+            store.keep_notified(name, NotificationState(), (), now)
     store.close()
     return names
 

@@ -39,7 +39,7 @@ def keep(state: Path, glider: str, dives: tuple[Assessment, ...], incidents: tup
         identity = SegmentId(dives[-1].t_dive, glider, dives[-1].segment)
         store.segments.put(Segment(identity, "m", "sbd", dives[-1].t_surface, (1, 1, ""), {}))
         store.apply(glider, Outcome(GliderState(), float("-inf"), dives, incidents, None))
-        store.keep_notified(glider, NotificationState())
+        store.keep_notified(glider, NotificationState(), (), 0.0)
     store.close()
 
 

@@ -27,7 +27,7 @@ def judge(history: History, limits: Mapping[str, Limits]) -> Judged:
 def judge_rows(
     rows: Sequence[tuple[float, Readings]], since: float, limits: Mapping[str, Limits]
 ) -> list[Judged]:
-    """What the rules find in each file and call from a time (s) on; `rows` are all so far, in order of time."""
+    """What the rules find in each file and call from a time (s) on; `rows` are all, in order of time."""
     return [
         judge(History(recent(rows[: k + 1]), readings), limits)
         for k, (t, readings) in enumerate(rows)
