@@ -45,6 +45,7 @@ from gliderwatch.incidents.notices import (
     Unjudged,
 )
 from gliderwatch.messages.notice_text import operator, render
+from gliderwatch.messages.template import with_machine
 from gliderwatch.model import (
     Alert,
     Assessment,
@@ -124,7 +125,8 @@ def blind(first: bool) -> Alert:
     ends = [SURFACE - 4 * HOUR * k for k in range(6)]
     items = tuple(Unjudged(e - 3 * HOUR, e, Hindrance.NO_CACHE, words, "0a1b2c3d") for e in reversed(ends))
     found = Blindness("electa", SURFACE - 24 * HOUR, SURFACE, SURFACE - 24 * HOUR, items)
-    return message(Kind.UNKNOWN, Blind(found, first, situation(HEALTHY)), Severity.WARNING)
+    kind = Kind.UNKNOWN if first else Kind.REMINDER
+    return message(kind, Blind(found, first, situation(HEALTHY)), Severity.WARNING)
 
 
 CALL = Call(
@@ -176,6 +178,8 @@ def kinds() -> dict[str, Alert]:
     fleet, silent = Fleet(2, 0, SURFACE - HOUR), Fleet(3, 3, SURFACE - 8 * HOUR, ("angus", "bruce", "cora"))
     regime = replace(HEALTHY, speed=0.49, speed_min=0.42, speed_max=0.66)
     info, warning = Severity.INFO, Severity.WARNING
+    apart = TwoGliders(Fix(SURFACE, 24.2, -83.0), Fix(SURFACE, 30.0, -79.0), 8e5)
+    two = Irregularity("i", "electa", SURFACE, apart)
     fixes = next(mode.words for mode in MODES if mode.words.startswith("the ground"))
     return {
         "anomaly-wing-roll": anomaly(roll_mean=0.31),
@@ -208,10 +212,10 @@ def kinds() -> dict[str, Alert]:
         "surfacing": message(Kind.SURFACING, Surfaced(HEALTHY, DIVE - 1800, NEXT), info),
         "regime": message(Kind.REGIME, NewRegime(regime, 0.29, DIVE, situation(regime, 0.47, 0.48)), info),
         "overdue": message(Kind.OVERDUE, Overdue(absence(fleet), True), warning),
-        "overdue-circle": message(Kind.OVERDUE, Overdue(absence(Fleet(), 9100.0), False), warning),
+        "overdue-circle": message(Kind.REMINDER, Overdue(absence(Fleet(), 9100.0), False), warning),
         "overdue-shore": message(Kind.OVERDUE, Overdue(absence(silent), True), warning),
         "calls-again": message(
-            Kind.ALL_CLEAR, CalledAgain(SURFACE - 9 * HOUR, SURFACE, HEALTHY, False), info
+            Kind.ALL_CLEAR, CalledAgain(SURFACE - 9 * HOUR, SURFACE, HEALTHY, False, NEXT), info
         ),
         "called-in-time": message(Kind.CORRECTION, CalledInTime(SURFACE - HOUR, SURFACE - 2 * HOUR), info),
         "unknown": blind(first=True),
@@ -225,29 +229,29 @@ def kinds() -> dict[str, Alert]:
         "neighbours": message(
             Kind.NEIGHBOURS,
             DiffersFromNeighbours(
-                Hypothesis("electa", Fault.LOSS, DIVE, 6, 0.41, 0.06, 43.0), ("angus", "bruce"), 8e3
+                Hypothesis("electa", Fault.LOSS, DIVE, 6, 0.41, 0.06, 43.0),
+                ("angus", "bruce"),
+                8e3,
+                situation(HEALTHY),
             ),
         ),
         "neighbours-all": message(
             Kind.NEIGHBOURS,
             DiffersFromNeighbours(
-                Hypothesis("", Fault.TURN, DIVE, 6, 0.2, 0.03, 30.0), ("angus", "bruce"), 8e3
+                Hypothesis("", Fault.TURN, DIVE, 6, 0.2, 0.03, 30.0),
+                ("angus", "bruce"),
+                8e3,
+                situation(HEALTHY),
             ),
         ),
-        "health": message(Kind.HEALTH, HealthFound(LEAK, False, FIX)),
-        "health-reminder": message(Kind.REMINDER, HealthReminder(LEAK, 26.0, FIX)),
+        "health": message(Kind.HEALTH, HealthFound(LEAK, False, FIX, situation(HEALTHY))),
+        "health-reminder": message(Kind.REMINDER, HealthReminder(LEAK, 26.0, FIX, situation(HEALTHY))),
         "health-over": message(Kind.ALL_CLEAR, HealthOver(LEAK, False, FIX), info),
         "still-aborted": message(
             Kind.REMINDER,
             StillAborted((AbortReport(Happening.ABORTING, DIVE, "LEAK", Severity.CRITICAL),), CALL, 26.0),
         ),
-        "operator-files": message(
-            Kind.OPERATOR,
-            Irregularity(
-                "i", "electa", SURFACE, TwoGliders(Fix(SURFACE, 24.2, -83.0), Fix(SURFACE, 30.0, -79.0), 8e5)
-            ),
-            warning,
-        ),
+        "operator-files": with_machine(message(Kind.OPERATOR, two, warning), "dockserver-2"),
         "operator": operator(
             "no file of any glider for 26.0 h",
             "The last one came 2022-11-04 10:34 UTC. Until one comes no glider is watched.\n"

@@ -49,9 +49,9 @@ def test_each_number_of_the_baseline_has_words() -> None:
     [
         ({"depth_rate_climb": -0.09}, HEAVY, "climbs at 0.09 m/s, usually 0.14 to 0.18: slower"),
         ({"depth_rate_dive": 0.1}, DRAG, "dives at 0.10 m/s, usually 0.14 to 0.18: slower"),
-        ({"roll_mean": -0.4}, WING, "roll -23 degrees, usually -4 to 5: to the left"),
-        ({"pitch_climb": 0.3}, TRIM, "pitch 17 degrees climbing, usually 21 to 30: flatter"),
-        ({"pitch_dive": -0.6}, TRIM, "pitch 34 degrees diving, usually 21 to 30: steeper"),
+        ({"roll_mean": -0.4}, WING, "roll -23°, usually -4 to 5: to the left"),
+        ({"pitch_climb": 0.3}, TRIM, "pitch 17° climbing, usually 21 to 30: flatter"),
+        ({"pitch_dive": -0.6}, TRIM, "pitch 34° diving, usually 21 to 30: steeper"),
         ({"ballast_climb": 120e-6}, HEAVY, "pumps 120 cc to climb, usually 204 to 276: less"),
         ({"ballast_dive": -120e-6}, TRIM, "pumps 120 cc to dive, usually 213 to 288: less"),
         ({"vacuum": 15e3}, HEAVY, "vacuum 15.0 kPa, usually 20.0 to 28.0: less"),
@@ -70,9 +70,9 @@ def test_out_of_the_usual_speaks_for_the_cause_that_it_fits(
 @pytest.mark.parametrize(
     ("changes", "cause", "words"),
     [
-        ({}, WING, "roll 1 degrees, as usual (-4 to 5)"),
+        ({}, WING, "roll 1°, as usual (-4 to 5)"),
         ({}, DRAG, "climbs at 0.16 m/s, as usual (0.14 to 0.18)"),
-        ({"roll_mean": -0.4}, DRAG, "roll -23 degrees, usually -4 to 5: to the left"),
+        ({"roll_mean": -0.4}, DRAG, "roll -23°, usually -4 to 5: to the left"),
         ({"yos": 12.0}, DRAG, "4.0 yos an hour, usually 1.4 to 2.6: more"),
     ],
 )
@@ -140,7 +140,7 @@ def test_fixed_bounds_only_where_nothing_is_usual() -> None:
         known = learn(known, dive)
     pro, con = weigh(replace(bare, evidence={**tilted, **told(known, dive)}), Kind.ANOMALY, WING)
     assert not any(line.startswith("mean roll") for line in (*pro, *con))
-    assert "roll 22 degrees, as usual (17 to 26)" in con
+    assert "roll 22°, as usual (17 to 26)" in con
 
 
 @pytest.mark.parametrize(

@@ -194,7 +194,7 @@ class TestThread:
         assert made.kind is Kind.REMINDER
         assert made.severity is Severity.CRITICAL
         assert made.title == "electa STILL SLOW after 26.0 h: 0.11 m/s"
-        assert "still open, after 26.0 h" in made.body and len(made.body.rstrip().split("\n")) == 5
+        assert "still open, after 26.0 h" in made.body and len(made.brief.rstrip().split("\n")) == 5
         assert "As bad as ever" in made.body
 
     def test_reminder_after_a_dive_without_result(self) -> None:
@@ -260,7 +260,7 @@ class TestNotices:
         assert made.title == "GLIDERWATCH dockserver-2: no new files"
         assert made.body == (
             "GLIDERWATCH dockserver-2, 2022-11-05 12:34 UTC: no new files.\n"
-            "None for 6 h.\n\nWhat to do\n- Check it.\n"
+            "None for 6 h.\n\nWhat to do\n- Check it.\n\nHelp: docs/pilots.md, GLIDERWATCH\n"
         )
         assert made.kind is Kind.OPERATOR
 

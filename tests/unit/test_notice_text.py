@@ -20,9 +20,10 @@ KINDS = kinds()
 WHICH = r"electa|GLIDERWATCH dockserver-2"
 SINCE = r"\d{4}-\d\d-\d\d \d\d:\d\d UTC"
 SURE = r"\(\d+ %\)|\(\d+ of \d+( calls)?\)|\d of \d other gliders|\d dives? in a row|only one at sea"
+TWICE = "twice in a row"
 WHERE = r"\d\d° \d\d\.\d{3}' N, \d{3}° \d\d\.\d{3}' W"
 NEXT = r"Next call: "
-TODO = rf"{DO}\n- \w|Nothing to do|ake it on"
+TODO = rf"{DO}\n- \w|Nothing to do|ake it on|Quiet while you work"
 ALARM = (WHICH, SINCE, SURE, WHERE, NEXT, TODO)
 QUESTIONS = {
     "anomaly": ALARM,
@@ -30,12 +31,12 @@ QUESTIONS = {
     "overdue": ALARM,
     "unknown": ALARM,
     "abort": ALARM,
-    "calls": (WHICH, SINCE, WHERE, TODO),
+    "calls": (WHICH, SINCE, WHERE, NEXT, TODO),
     "called": (WHICH, SINCE, TODO),
     "call": ALARM,
-    "neighbours": (WHICH, SINCE, SURE, TODO),
+    "neighbours": (WHICH, SINCE, SURE, WHERE, NEXT, TODO),
     "health-over": (WHICH, SINCE, WHERE, TODO),
-    "health": (WHICH, SINCE, WHERE, TODO),
+    "health": (WHICH, SINCE, TWICE, WHERE, NEXT, TODO),
     "still-aborted": (WHICH, SINCE, WHERE, NEXT, TODO),
     "reminder": (WHICH, SINCE, WHERE, NEXT, TODO),
     "all-clear": (WHICH, SINCE, WHERE, NEXT, TODO),
@@ -50,6 +51,9 @@ QUESTIONS = {
     "operator": (WHICH, SINCE, TODO),
 }
 """What the first 600 characters have to answer, by how its name begins."""
+
+
+REMINDERS = {"reminder", "still-aborted", "health-reminder", "overdue-circle", "unknown-reminder"}
 
 
 class Tags(HTMLParser):
@@ -101,13 +105,13 @@ def test_the_first_600_characters_answer_what_is_asked(name: str) -> None:
 @pytest.mark.parametrize("name", KINDS)
 def test_what_stands_alone_is_short(name: str) -> None:
     lead, *rest = KINDS[name].brief.split("\n\n")
-    limit = {"reminder": 5, "surfacing": 4, "still-aborted": 5, "health-reminder": 5}.get(name, 3)
+    limit = 5 if name in REMINDERS else 4 if name == "surfacing" else 3
     assert len(lead.rstrip("\n").split("\n")) <= limit
     for block in rest:
         if block.startswith(DO):
             assert len(block.rstrip("\n").split("\n")) <= 1 + 3
-    if name in ("reminder", "surfacing"):
-        assert not rest and KINDS[name].body == KINDS[name].brief
+    if name in {*REMINDERS, "surfacing"}:
+        assert not rest and KINDS[name].body.startswith(f"{KINDS[name].brief}\nHelp: ")
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -175,7 +179,7 @@ def test_how_sure_follows_from_the_standard_error() -> None:
 def test_what_is_as_usual_speaks_only_of_the_cause() -> None:
     """Pitch as usual fits a remora; rates as usual speak against it."""
     drag = KINDS["anomaly-drag"].body
-    assert "pitch 26 degrees climbing, as usual" not in drag.partition("Against: ")[2]
+    assert "pitch 26° climbing, as usual" not in drag.partition("Against: ")[2]
     growth = KINDS["anomaly-growth"].body.partition("Against: ")[2]
     assert "climbs at 0.16 m/s, as usual" in growth
 

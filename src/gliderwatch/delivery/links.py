@@ -14,6 +14,7 @@ from urllib.parse import quote
 
 from gliderwatch.delivery.dispatcher import Sender
 from gliderwatch.errors import GliderwatchError
+from gliderwatch.messages.guide import with_help_link
 from gliderwatch.messages.template import DO
 from gliderwatch.model import Alert, Kind
 
@@ -95,7 +96,7 @@ class Linked:
 
     def send(self, alert: Alert) -> None:
         """Deliver a message with its links. Raises DeliveryError."""
-        self.sender.send(with_links(alert, self.links(alert)))
+        self.sender.send(with_links(with_help_link(alert, self.public), self.links(alert)))
 
     def links(self, alert: Alert) -> tuple[tuple[str, str], ...]:
         """The links of a message, each with its label."""

@@ -14,6 +14,7 @@ from gliderwatch.health.rules import Judged
 from gliderwatch.incidents import aborts, calls, health, irregularities, neighbours, overdue, unjudged
 from gliderwatch.incidents.acknowledgement import Acks
 from gliderwatch.incidents.constants import GONE
+from gliderwatch.incidents.facts import informed
 from gliderwatch.incidents.notices import Irregularity, Notice
 from gliderwatch.incidents.notifications import (
     IncidentFacts,
@@ -95,7 +96,15 @@ def due(before: NotificationState, facts: GliderFacts, wanted: Wanted, findings:
     notified, of_health = _of_health(notified, facts, wanted, findings.health, now)
     return Due(
         notified,
-        (*of_silences, *of_files, *of_incidents, *of_watch, *of_fleet, *of_calls, *of_health),
+        (
+            *of_silences,
+            *of_files,
+            *of_incidents,
+            *of_watch,
+            *informed(of_fleet, facts),
+            *of_calls,
+            *informed(of_health, facts),
+        ),
         unacknowledged(notified, facts.incidents(), acks),
     )
 

@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Protocol
 
 from gliderwatch.incidents.constants import TREND_DIVES
-from gliderwatch.incidents.notices import Situation
+from gliderwatch.incidents.notices import (
+    DiffersFromNeighbours,
+    HealthFound,
+    HealthReminder,
+    Notice,
+    Situation,
+)
 from gliderwatch.model import Assessment, Incident, NextSurfacing
 
 
@@ -39,6 +47,19 @@ def situation(facts: Facts, incident: str = "") -> Situation:
     others = tuple(i for i in facts.incidents() if i.id != incident and i.cleared_at is None)
     expected = None if latest is None else next_surfacing(facts, latest)
     return Situation(latest, tuple(speeds), expected, others)
+
+
+def informed(notices: Sequence[Notice], facts: Facts) -> list[Notice]:
+    """Notices that say beside their own matter how it stands with the glider: of rules that see no dives."""
+    if not notices:
+        return []
+    now = situation(facts)
+    return [
+        replace(each, content=replace(each.content, situation=now))
+        if isinstance(each.content, HealthFound | HealthReminder | DiffersFromNeighbours)
+        else each
+        for each in notices
+    ]
 
 
 def next_surfacing(facts: Facts, latest: Assessment) -> NextSurfacing | None:

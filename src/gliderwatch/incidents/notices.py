@@ -195,12 +195,14 @@ class Overdue:
 @dataclass(frozen=True, slots=True)
 class CalledAgain:
     """The first sign of life, ``at`` (s), since the ``last_sign`` before (s); ``last`` is its last dive that
-    ended. ``for_all``: the notice that it stayed away stood for all gliders, because none called."""
+    ended, ``expected`` the next surfacing. ``for_all``: the notice that it stayed away stood for all gliders,
+    because none called."""
 
     last_sign: float
     at: float
     last: Assessment | None
     for_all: bool
+    expected: NextSurfacing | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -352,6 +354,7 @@ class HealthFound:
     incident: HealthIncident
     is_worse: bool
     fix: Fix | None
+    situation: Situation = NOTHING_ELSE
 
 
 @dataclass(frozen=True, slots=True)
@@ -361,6 +364,7 @@ class HealthReminder:
     incident: HealthIncident
     hours: float
     fix: Fix | None
+    situation: Situation = NOTHING_ELSE
 
 
 @dataclass(frozen=True, slots=True)
@@ -416,6 +420,7 @@ class DiffersFromNeighbours:
     found: Hypothesis
     neighbours: tuple[str, ...]
     nearest: float
+    situation: Situation = NOTHING_ELSE
 
 
 Content = (

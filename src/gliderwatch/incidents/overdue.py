@@ -25,7 +25,7 @@ from gliderwatch.incidents.constants import (
     SHORTEST_INTERVAL,
     TIME_SIGMAS,
 )
-from gliderwatch.incidents.facts import Facts
+from gliderwatch.incidents.facts import Facts, next_surfacing
 from gliderwatch.incidents.notices import (
     Absence,
     CalledAgain,
@@ -258,7 +258,10 @@ def _on_calls(before: Silence, facts: SilenceFacts, now: float) -> tuple[Silence
     silence = replace(before, messages=before.messages + 1, called=at, withdrawn=at <= call.due)
     if silence.withdrawn:
         return silence, _notice(before, facts.glider, now, Kind.CORRECTION, CalledInTime(call.due, at))
-    content = CalledAgain(call.last_sign, at, facts.last_surfacing(now), before.shore == before.id)
+    last = facts.last_surfacing(now)
+    expected = None if last is None else next_surfacing(facts, last)
+    expected = None if expected is None or expected.t <= at else expected
+    content = CalledAgain(call.last_sign, at, last, before.shore == before.id, expected)
     return silence, _notice(before, facts.glider, at, Kind.ALL_CLEAR, content)
 
 

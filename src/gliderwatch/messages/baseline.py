@@ -44,14 +44,14 @@ class BaselineRemark:
 _DEGREES, _CC = degrees(1.0), 1e6
 WORDINGS = (
     Wording("depth_rate_climb", "climbs at {} m/s", "slower", "faster", digits=2),
-    Wording("roll_mean", "roll {} degrees", "to the left", "to the right", per=_DEGREES, signed=True),
+    Wording("roll_mean", "roll {}°", "to the left", "to the right", per=_DEGREES, signed=True),
     Wording("depth_rate_dive", "dives at {} m/s", "slower", "faster", digits=2),
     Wording("rate_ratio", "climbs {} times as fast as it dives", "less", "more", digits=2),
-    Wording("pitch_climb", "pitch {} degrees climbing", "flatter", "steeper", per=_DEGREES),
-    Wording("pitch_dive", "pitch {} degrees diving", "flatter", "steeper", per=_DEGREES),
+    Wording("pitch_climb", "pitch {}° climbing", "flatter", "steeper", per=_DEGREES),
+    Wording("pitch_dive", "pitch {}° diving", "flatter", "steeper", per=_DEGREES),
     Wording(
         "pitch_asymmetry",
-        "climb {} degrees steeper than dive",
+        "climb {}° steeper than dive",
         "flatter",
         "steeper",
         per=_DEGREES,

@@ -117,4 +117,5 @@ def angle(radians: float) -> str:
     >>> angle(-0.4538)
     '-26 degrees'
     """
-    return f"{round(degrees(radians))} degrees"
+    whole = round(degrees(radians))
+    return f"{whole} degree" if abs(whole) == 1 else f"{whole} degrees"

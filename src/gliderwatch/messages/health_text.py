@@ -15,7 +15,7 @@ from gliderwatch.health.rule import Finding
 from gliderwatch.health.rules import RULES
 from gliderwatch.incidents.notices import HealthFound, HealthIncident, HealthOver, HealthReminder
 from gliderwatch.messages.formatting import clean, duration, short_place, utc
-from gliderwatch.messages.phrases import map_of, name_of, take_on_thread
+from gliderwatch.messages.phrases import map_of, name_of, next_call, take_on_thread
 from gliderwatch.messages.template import Page, Text, sentence, titled
 from gliderwatch.model import Fix
 
@@ -74,8 +74,13 @@ def found(glider: str, content: HealthFound) -> Text:
     again = "is worse now, " if content.is_worse else ""
     first = f"{name}: {again}{finding.text}, since {utc(incident.since)}."
     short = finding.text.partition(",")[0]
-    return titled(glider, _title(incident), f": {short}"), _page(
-        first, glider, incident, finding, content.fix
+    checks = tuple(sentence(f"{line}.") for line in _CHECKS.get(incident.rule, ()))
+    todo = ("Plot more of these values before you believe it.", *checks)
+    fix = content.fix
+    links = (*(() if fix is None else map_of(fix.lat, fix.lon)), *take_on_thread(glider))
+    lead = (first, _where(fix), next_call(content.situation.expected))
+    return titled(glider, _title(incident), f": {short}"), Page(
+        lead, _numbers(incident, finding), do=todo[:3], links=links
     )
 
 
@@ -85,11 +90,13 @@ def reminder(glider: str, content: HealthReminder) -> Text:
     since = duration(3600 * content.hours)
     (label, take), *_ = take_on_thread(glider)
     last = plot(incident.last) if incident.last.last else "no values"
+    how = "Less bad than at its worst" if incident.last.severity < incident.worst.severity else "Not better"
     page = Page(
         (
-            f"{name}: for {since} now: {incident.last.text}.",
-            f"Since {utc(incident.since)}; last: {last}.",
+            f"{name}: still so after {since}, since {utc(incident.since)}: {incident.last.text}.",
+            f"{how}; last values {last}.",
             _where(content.fix),
+            next_call(content.situation.expected),
             f"{label}, if nobody has: {take}",
         )
     )
@@ -121,13 +128,6 @@ def _numbers(incident: HealthIncident, finding: Finding) -> tuple[tuple[str, str
         *((("Last values", plot(finding)),) if finding.last else ()),
         ("Rule", f"{about} Its limits: `health.{incident.rule}` in the configuration"),
     )
-
-
-def _page(first: str, glider: str, incident: HealthIncident, finding: Finding, fix: Fix | None) -> Page:
-    checks = tuple(sentence(f"{line}.") for line in _CHECKS.get(incident.rule, ()))
-    todo = ("Plot more of these values before you believe it.", *checks)
-    links = (*(() if fix is None else map_of(fix.lat, fix.lon)), *take_on_thread(glider))
-    return Page((first, _where(fix)), _numbers(incident, finding), do=todo[:3], links=links)
 
 
 def plot(finding: Finding) -> str:

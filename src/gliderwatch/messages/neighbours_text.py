@@ -9,7 +9,7 @@ from gliderwatch.fleet.cross_check import Fault, Hypothesis
 from gliderwatch.incidents.notices import DiffersFromNeighbours
 from gliderwatch.messages.evidence import CERTAIN
 from gliderwatch.messages.formatting import clean, utc
-from gliderwatch.messages.phrases import mute_link, name_of
+from gliderwatch.messages.phrases import map_of, mute_link, name_of, next_call, where
 from gliderwatch.messages.template import Page, Text, titled
 
 _CHECKS = {
@@ -32,7 +32,7 @@ _SHARED = (
 
 def differs(glider: str, content: DiffersFromNeighbours) -> Text:
     """The currents of a glider, or of all alike, are not those that its neighbours measure."""
-    found, shared = content.found, not content.found.glider
+    found, shared, last = content.found, not content.found.glider, content.situation.last
     what = _what(found.fault, found.size)
     chance = min(1 / (1 + exp(-found.ratio / 2)), CERTAIN)  # twice the log of the odds
     since = f"since {utc(found.since)} ({found.dives} dives); almost sure ({100 * chance:.0f} %)"
@@ -44,7 +44,7 @@ def differs(glider: str, content: DiffersFromNeighbours) -> Text:
     else:
         first = f"{name_of(glider)} {what}, {since}: its currents do not fit those of its neighbours."
     page = Page(
-        (first,),
+        (first, where(content.situation.last), next_call(content.situation.expected)),
         (
             ("How much", _amount(found.fault, found.size, found.sigma)),
             (
@@ -53,7 +53,7 @@ def differs(glider: str, content: DiffersFromNeighbours) -> Text:
             ),
         ),
         do=_SHARED if shared else _CHECKS[found.fault],
-        links=mute_link(glider),
+        links=(*(() if last is None else map_of(last.lat, last.lon)), *mute_link(glider)),
         symbols=(f"twice the log likelihood ratio {found.ratio:.0f}",),
     )
     short = "LOSES SPEED" if found.fault is Fault.LOSS else "COMPASS OFF"
@@ -75,9 +75,9 @@ def _what(fault: Fault, size: float) -> str:
 
 def _amount(fault: Fault, size: float, sigma: float) -> str:
     if fault is Fault.LOSS:
-        return f"{100 * size:.0f} % of its speed, +- {196 * sigma:.0f} % (95 %)"
+        return f"{100 * size:.0f} % of its speed, ± {196 * sigma:.0f} % (95 %)"
     side = "too much" if size > 0 else "too little"
-    return f"{abs(degrees(size)):.0f} degrees {side}, +- {1.96 * degrees(sigma):.0f} (95 %)"
+    return f"{abs(degrees(size)):.0f} degrees {side}, ± {1.96 * degrees(sigma):.0f} (95 %)"
 
 
 def _names(names: tuple[str, ...]) -> str:

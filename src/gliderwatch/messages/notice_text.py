@@ -20,6 +20,7 @@ from gliderwatch.messages import (
     unjudged_text,
 )
 from gliderwatch.messages.formatting import clean, utc
+from gliderwatch.messages.guide import with_help
 from gliderwatch.messages.template import Page, Text, lead_and_actions, titled
 from gliderwatch.model import Alert, Kind, Severity
 
@@ -53,7 +54,7 @@ _WRITERS: dict[type, Callable[[str, Any], Text]] = {
 def render(notice: n.Notice) -> Alert:
     """The message of a notice."""
     title, page = _WRITERS[type(notice.content)](notice.glider, notice.content)
-    return Alert(
+    made = Alert(
         id=notice.id,
         glider=notice.glider,
         time=notice.time,
@@ -66,6 +67,7 @@ def render(notice: n.Notice) -> Alert:
         html=page.html(title),
         brief=page.brief(),
     )
+    return with_help(made)
 
 
 def operator(
@@ -86,7 +88,7 @@ def operator(
     who = f"GLIDERWATCH {clean(machine, 16)}" if machine else "GLIDERWATCH"
     subject = titled("", f"{who}: {title}")
     page = Page((f"{who}, {utc(time)}: {clean(title)}.", *lead), do=todo)
-    return Alert(
+    made = Alert(
         id=alert_id,
         glider="",
         time=time,
@@ -99,3 +101,4 @@ def operator(
         html=page.html(subject),
         brief=page.brief(),
     )
+    return with_help(made)

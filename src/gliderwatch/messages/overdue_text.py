@@ -16,11 +16,12 @@ from gliderwatch.messages.formatting import (
     short_place,
     utc,
 )
-from gliderwatch.messages.phrases import map_of, mute_link, name_of, where
+from gliderwatch.messages.phrases import map_of, mute_link, name_of, next_call, where
 from gliderwatch.messages.template import Page, Text, titled
 from gliderwatch.model import Assessment
 
 _EACH = "This stands for all of them: each that still stays away when one calls gets a message of its own."
+_NO_CALL = "Next call: not known any more; the first sign of life is reported at once."
 _ROUND = 0.9
 """Ratio of the semi-axes from which an ellipse is called a circle."""
 
@@ -32,17 +33,26 @@ def overdue(glider: str, content: Overdue) -> Text:
     still = "" if content.first else "still "
     first = f"{name_of(glider)} is {still}overdue by {late}: its call of {utc(a.expected_at)} did not come, "
     first += f"silent for {silent}. {_side(a.fleet)}"
+    if not content.first:
+        return titled(glider, f"STILL OVERDUE {late}"), _still(glider, a, first)
     trouble, harmless = _weighed(a)
-    lists = (("For trouble of the glider", trouble), ("Against", harmless))
+    lists = (("For trouble of the glider", trouble), ("Against trouble of the glider", harmless))
     page = Page(
-        (first, _search(a), "Next call: not known any more; the first sign of life is reported at once."),
+        (first, _search(a), _NO_CALL),
         _numbers(a),
         tuple((heading, lines) for heading, lines in lists if lines),
         _todo(a),
         (*(() if a.area is None else map_of(a.area.lat, a.area.lon)), *mute_link(glider)),
     )
     more = f", all {a.fleet.others + 1} silent: dockserver?" if a.fleet.is_silent else ""
-    return titled(glider, f"{still.upper()}OVERDUE {late}", more), page
+    return titled(glider, f"OVERDUE {late}", more), page
+
+
+def _still(glider: str, a: Absence, first: str) -> Page:
+    """A reminder: five lines."""
+    (label, command), *_ = mute_link(glider)
+    worse = f"Worse: no sign of life since {utc(a.last_sign)}, the area grows."
+    return Page((first, worse, _search(a), _NO_CALL, f"{label}: {command}"))
 
 
 def called_again(glider: str, content: CalledAgain) -> Text:
@@ -51,7 +61,7 @@ def called_again(glider: str, content: CalledAgain) -> Text:
     first = f"{name_of(glider)} calls again: {utc(content.at)}, after {silent} of silence. "
     first += "It is not overdue any more."
     page = Page(
-        (first, where(content.last), *((_EACH,) if content.for_all else ())),
+        (first, where(content.last), next_call(content.expected), *((_EACH,) if content.for_all else ())),
         (("Silent", f"{utc(content.last_sign)} to {utc(content.at)}"), *_last(content.last)),
         do=("Nothing; its dives are judged as its files come.",),
     )

@@ -173,6 +173,11 @@ def with_pictures(html: str, pictures: Sequence[tuple[str, str]]) -> str:
     return html.replace(before, shown + before, 1)
 
 
+def with_machine(alert: Alert, machine: str) -> Alert:
+    """A message that names the machine whose gliderwatch sends it, above all else."""
+    return with_lead(alert, f"GLIDERWATCH {clean(machine, 16)}, to its operator:")
+
+
 def with_lead(alert: Alert, line: str) -> Alert:
     """A message with one more line above all others."""
     html = alert.html.replace("<p ", f"<p><b>{escape(line)}</b></p>\n<p ", 1)

@@ -61,6 +61,17 @@ def blind(glider: str, content: Blind) -> Text:
     first += f"{utc(found.since)} ({lasted}); sure ({count} of {of}): {clean(main.words, 120)}. "
     first += "A fault of the glider would not be seen."
     last = "none yet" if found.judged is None else f"surfaced {utc(found.judged)}"
+    if not content.first:
+        (label, command), *_ = mute_link(glider)
+        lead = (
+            first,
+            f"Not better. Last judged dive: {last}.",
+            where(now.last),
+            next_call(now.expected),
+        )
+        short = _SHORT.get(main.cause, "")
+        title = titled(glider, f"STILL CANNOT BE JUDGED for {lasted}", f": {short}" if short else "")
+        return title, Page((*lead, f"{label}: {command}"))
     others = tuple(_reason(*reason) for reason in reasons[1:])
     page = Page(
         (first, where(now.last), next_call(now.expected)),
@@ -73,8 +84,7 @@ def blind(glider: str, content: Blind) -> Text:
         mute_link(glider),
     )
     short = _SHORT.get(main.cause, "")
-    still = "" if content.first else "STILL "
-    return titled(glider, f"{still}CANNOT BE JUDGED for {lasted}", f": {short}" if short else ""), page
+    return titled(glider, f"CANNOT BE JUDGED for {lasted}", f": {short}" if short else ""), page
 
 
 def judged_again(glider: str, content: JudgedAgain) -> Text:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
@@ -14,12 +15,13 @@ from gliderwatch.health.readings import of_call, of_segment
 from gliderwatch.incidents import overdue
 from gliderwatch.incidents.acknowledgement import with_mute
 from gliderwatch.incidents.due import Findings, Wanted, due
-from gliderwatch.incidents.notices import Fleet
+from gliderwatch.incidents.notices import Fleet, Notice
 from gliderwatch.incidents.notifications import NotificationState
 from gliderwatch.incidents.send_schedule import AT_ONCE, Wait
 from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.messages.notice_text import render
-from gliderwatch.model import Alert, Assessment, Segment, SegmentId
+from gliderwatch.messages.template import with_machine
+from gliderwatch.model import Alert, Assessment, Kind, Segment, SegmentId
 from gliderwatch.navigation.clock import moved
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
@@ -268,11 +270,17 @@ def _due_messages(
     if attention.neighbours and params.reference == "dac":
         found = replace(found, currents=_currents(store, glider, before))
     what = due(before, facts, wanted, found, now)
-    alerts = tuple(map(render, what.notices))
+    alerts = tuple(map(_rendered, what.notices))
     if what.notified != before or alerts:
         channels = _channels(store, before.silences, routing)
         post_due(store, glider, what.notified, what.open_threads, alerts, channels, now)
     return alerts
+
+
+def _rendered(notice: Notice) -> Alert:
+    """The message of a notice; one to the operator names the machine."""
+    alert = render(notice)
+    return with_machine(alert, socket.gethostname()) if alert.kind is Kind.OPERATOR else alert
 
 
 def _with_advice(store: Store, glider: str, found: Findings) -> Findings:

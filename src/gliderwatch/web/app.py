@@ -28,7 +28,9 @@ from gliderwatch.export.dives import assessment_line
 from gliderwatch.figures.map_files import land_or_world
 from gliderwatch.health.rule import Limits
 from gliderwatch.messages.formatting import clean
+from gliderwatch.messages.guide import PAGE
 from gliderwatch.pages import render
+from gliderwatch.pages.guide import guide_page
 from gliderwatch.pages.reading import read_fleet, read_glider
 from gliderwatch.pages.render import Frame
 from gliderwatch.pages.view import GliderView, worst_first
@@ -77,6 +79,8 @@ class Site:
         frame = self.frame(path)
         if path == "index.html":
             return render.fleet_page(self.fleet(frame.now), frame, land_or_world(self.config.maps.files)[0])
+        if path == PAGE:
+            return guide_page()
         store = Store.reading(self.state)
         try:
             with store.guarded():
