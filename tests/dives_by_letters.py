@@ -61,6 +61,10 @@ class World:
         ended = [a for a in self.dives.values() if a.t_surface <= until and a.unusable is None]
         return max(ended, key=lambda a: a.t_surface, default=None)
 
+    def came_up(self, t: float) -> str:
+        """Nothing is known of why."""
+        return ""
+
 
 class Talk:
     """All messages while the dives of a world come in."""

@@ -87,7 +87,7 @@ USUAL = {
 
 def situation(dive: Assessment = SLOW, *earlier: float | None) -> Situation:
     """How it stands after a dive, with the speeds of those before it."""
-    return Situation(dive, (*earlier, dive.speed), NEXT)
+    return Situation(dive, (*earlier, dive.speed), NEXT, came_up="timeout expired")
 
 
 def message(kind: Kind, content: Content, severity: Severity = Severity.CRITICAL) -> Alert:

@@ -150,7 +150,8 @@ class Call:
 
     ``began`` and ``last_t`` are the first and the last time it printed (s, its clock), ``over`` whether the
     end of the connection is in the log, ``calls_back`` whether it said that it would. ``fix`` is the last
-    position, ``waypoint`` (latitude, longitude, degrees) where it is bound; ``reason`` why it is up.
+    position, ``surfaced`` the first that is of this stay at the surface; ``waypoint`` (latitude, longitude,
+    degrees) where it is bound; ``reason`` why it is up.
     ``announced`` are the names of files whose transfer began, ``sent`` of those whose transfer was done;
     ``mission`` and ``segment`` (its 8.3 name ``short``) what it named last as running, at ``mission_t`` (s).
     ``readings`` are the last
@@ -175,6 +176,7 @@ class Call:
     aborts: tuple[Aborts, ...] = ()
     happened: tuple[Happened, ...] = ()
     readings: tuple[CallReading, ...] = ()
+    surfaced: Fix | None = None
 
 
 # --------------------------------------------------------------------------- navigation

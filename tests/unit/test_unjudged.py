@@ -51,6 +51,9 @@ class Sea:
     def last_surfacing(self, until: float) -> None:
         return None
 
+    def came_up(self, t: float) -> str:
+        return ""
+
     def incidents(self) -> tuple[Incident, ...]:
         return ()
 

@@ -7,20 +7,24 @@ from math import expm1, sin
 import numpy as np
 
 from gliderwatch.estimation.constants import DRAG_BY_LIFT, USUAL_PITCH
-from gliderwatch.estimation.dive_measurement import OWN, SLIP
+from gliderwatch.estimation.dive_measurement import OWN, SLIP, are_apart
 from gliderwatch.estimation.glider import Estimate
 from gliderwatch.estimation.kalman import JointParams, JointState, expected_flow
 from gliderwatch.forecast.constants import VAGUE
 from gliderwatch.forecast.surfacing import (
     Flow,
+    Place,
     Surfacings,
     WaypointLog,
     active_waypoint,
+    called,
     expect,
     ground,
     learn,
 )
-from gliderwatch.model import Array, Dive, NextSurfacing
+from gliderwatch.model import Array, Dive, Fix, NextSurfacing
+from gliderwatch.navigation.constants import SHORTEST_DIVE
+from gliderwatch.navigation.geodesy import displacement
 from gliderwatch.sea.gauss_markov import FlowParams
 
 Outlook = tuple[float, float, Flow]
@@ -46,6 +50,21 @@ def after_dive(
     surfacings = learn(before, dive, waypoint, expected)
     outlook = look_ahead(estimate, ground(dive))
     return surfacings, None if outlook is None else expect(surfacings, *outlook, hours)
+
+
+def after_call(
+    before: Surfacings, fix: Fix, waypoint: Place | None, estimate: Estimate, hours: float | None
+) -> NextSurfacing | None:
+    """The next surfacing after one of which nothing but a call is known (yet): its `fix`, its `waypoint`.
+
+    ``before`` and ``estimate`` are of the last file. None where that has this surfacing, or is of another
+    deployment, or nothing can be expected yet.
+    """
+    if before.fix is None or fix.t - before.fix.t < SHORTEST_DIVE or are_apart(before.fix, fix):
+        return None
+    moved = displacement(fix.lat, fix.lon, before.fix.lat, before.fix.lon)
+    outlook = look_ahead(estimate, moved / (fix.t - before.fix.t))
+    return None if outlook is None else expect(called(before, fix, waypoint), *outlook, hours)
 
 
 def look_ahead(estimate: Estimate, over_ground: Array | None) -> Outlook | None:

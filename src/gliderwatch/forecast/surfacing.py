@@ -204,6 +204,12 @@ def ground(dive: Dive) -> Array | None:
     return np.asarray(moved / max(dive.end.t - dive.start.t, 1.0))
 
 
+def called(state: Surfacings, fix: Fix, waypoint: Place | None) -> Surfacings:
+    """The state after a surfacing of which nothing but a call has told: it begins the way ahead, and nothing
+    is learnt of the way there."""
+    return replace(state, fix=fix, waypoints=_waypoints(state.waypoints, waypoint))
+
+
 def _timed(state: Surfacings, dive: Dive, end: Fix) -> Surfacings:
     """The state with the times of a dive."""
     known = replace(state, duration=dive.t_surface - dive.t_dive)

@@ -30,6 +30,9 @@ class Facts(Protocol):
     def last_surfacing(self, until: float) -> Assessment | None:
         """The last dive that has ended with a fix and surfaced at `until` (s) or before."""
 
+    def came_up(self, t: float) -> str:
+        """Why it came up at a time (s), as it said in its call; empty where that is not known."""
+
 
 def last_dives(facts: Facts, n: int) -> list[Assessment]:
     """The last `n` dives that have ended with a fix, the newest first."""
@@ -46,7 +49,8 @@ def situation(facts: Facts, incident: str = "") -> Situation:
     latest, speeds = dives[0] if dives else None, [dive.speed for dive in reversed(dives)]
     others = tuple(i for i in facts.incidents() if i.id != incident and i.cleared_at is None)
     expected = None if latest is None else next_surfacing(facts, latest)
-    return Situation(latest, tuple(speeds), expected, others)
+    came_up = "" if latest is None else facts.came_up(latest.t_surface)
+    return Situation(latest, tuple(speeds), expected, others, came_up)
 
 
 def informed(notices: Sequence[Notice], facts: Facts) -> list[Notice]:

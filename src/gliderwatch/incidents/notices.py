@@ -34,13 +34,15 @@ class Situation:
     """What a pilot asks beside what a notice is about.
 
     ``last`` is the last dive that ended with a fix, ``speeds`` those of the last dives (m/s, None where not
-    known; oldest first), ``expected`` the next surfacing, ``others`` the other incidents that are open.
+    known; oldest first), ``expected`` the next surfacing, ``others`` the other incidents that are open;
+    ``came_up`` why the glider came up then, as it said in its call.
     """
 
     last: Assessment | None = None
     speeds: tuple[float | None, ...] = ()
     expected: NextSurfacing | None = None
     others: tuple[Incident, ...] = ()
+    came_up: str = ""
 
 
 NOTHING_ELSE = Situation()

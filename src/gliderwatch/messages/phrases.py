@@ -104,12 +104,13 @@ def dive_numbers(a: Assessment, situation: Situation) -> Pairs:
     reference = flow(a.reference_u, a.reference_v)
     if reference != UNKNOWN:
         reference += " (final)" if a.reference_final else " (provisional)"
-    reason = clean(a.reason, 100)
+    reason, came_up = clean(a.reason, 100), clean(situation.came_up, 60)
     return (
         *((("Last speeds", last),) if last else ()),
         ("Speed through water", f"{exact}, {normal_range(a)}{often}"),
         ("Where", place(a.lat, a.lon)),
         ("Dive", f"{utc(a.t_dive)} to {utc(a.t_surface)}, segment {clean(a.segment, 60)}"),
+        *((("Came up because", came_up),) if came_up else ()),
         ("Current, estimated", flow(a.flow_u, a.flow_v)),
         ("Current as the glider reckons it", reference),
         *((("Why it is flagged", reason),) if reason and a.flag and not is_named(a.reason) else ()),

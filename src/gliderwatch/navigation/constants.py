@@ -27,6 +27,9 @@ SUSPECT_DISTANCE = 30.0
 """m: a fix this near to the last one from before a dive may be the old one again; errors of GPS are 10 m."""
 JUMP = 100.0
 """m beside `FASTEST_OVER_GROUND` times the time: a position that moved further has jumped."""
+FILE_TO_CALL = 1800.0
+"""s from the end of a file within which a fix in the log of a call is of the surfacing that the file ends
+with: a glider that comes up calls within minutes, and again if the connection drops."""
 
 # When the glider flew
 DIVING_DEPTH = 3.0

@@ -66,6 +66,7 @@ class Intake:
         """Work with these parts, from nothing: a scan finds again what was at hand. Comes before all else."""
         self._runtime = runtime
         self._settled: deque[Path] = deque()
+        self._outdated: set[str] = set()
 
     @property
     def at_hand(self) -> int:
@@ -129,6 +130,10 @@ class Intake:
                 break
             self._judge_any(self._settled[0])
             self._settled.popleft()  # only now: when the state cannot be used, it has its turn again
+        if not self._settled:
+            for glider in self._outdated:
+                self._notify_if_last(glider)
+            self._outdated.clear()
         if not self._settled or 0 < len(fresh) <= AT_ONCE:
             self._runtime.feed()  # all that came together is in order of time before the first is decoded
 
@@ -282,7 +287,25 @@ class Intake:
         file, dialog = found
         params, routing = self._runtime.config.glider(file.glider), self._routing_if_last(file.glider)
         before = self._store.file(file.path)
-        taken = transaction.process_log(self._store, file, dialog, params, routing, time.time())
+        more = len(self._settled) > 1  # one after another would assess the same dives as often
+        try:
+            taken = transaction.process_log(
+                self._store,
+                file,
+                dialog,
+                params,
+                routing,
+                time.time(),
+                self._runtime.ocean.field(file.glider),
+                layers_of(self._runtime.config, file.glider),
+                catch_up=not more,
+            )
+        except Quarantine as error:
+            log.error("log cannot be assessed", path=file.path, glider=file.glider, exc_info=error.__cause__)
+            failed = judgement.failed(file, error)
+            taken = transaction.record_file(self._store, failed, params, routing, time.time())
+        if more and file.glider:
+            self._outdated.add(file.glider)
         if before is None or before.status != file.status:  # not once for each line that comes
             self._report(taken)
         else:
@@ -360,8 +383,16 @@ class Intake:
             self._notify(glider)
 
     def _notify(self, glider: str) -> None:
-        params = self._runtime.config.glider(glider)
-        self.send(transaction.notify_pilots(self._store, glider, params, self._runtime.routing, time.time()))
+        config, ocean = self._runtime.config, self._runtime.ocean.field(glider)
+        params, layers, routing = config.glider(glider), layers_of(config, glider), self._runtime.routing
+        try:
+            alerts = transaction.notify_pilots(
+                self._store, glider, params, routing, time.time(), ocean, layers
+            )
+        except Quarantine as error:
+            log.error("calls cannot be assessed", glider=glider, exc_info=error.__cause__)
+            return
+        self.send(alerts)
 
     def _routing_if_last(self, glider: str) -> Routing | None:
         """Who is notified of a glider; None while more of its files are at hand, or may be: then the last

@@ -313,9 +313,21 @@ def _process_log(
     """Let the clock run until a call was over, and take its log."""
     glider, is_read = log.file.glider, log.file.status is Status.TAKEN
     ticked = _tick(report, routing, log.sent) if is_read else []
-    outcome = transaction.process_log(
-        report.store, log.file, log.dialog, request.params(glider), routing, log.sent
-    )
+    try:
+        outcome = transaction.process_log(
+            report.store,
+            log.file,
+            log.dialog,
+            request.params(glider),
+            routing,
+            log.sent,
+            None if report.ocean is None else report.ocean.field(glider),
+            None if request.config is None else layers_of(request.config, glider),
+        )
+    except Quarantine as error:
+        outcome = transaction.record_file(
+            report.store, judgement.failed(log.file, error), request.params(glider), routing, log.sent
+        )
     if is_read:
         report.coming[glider].popleft()
         report.clock[glider] = max(log.sent, report.clock.get(glider, log.sent))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from math import inf
 
 from gliderwatch.errors import GliderwatchError, NotAssessed
@@ -22,16 +23,17 @@ from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.messages.notice_text import render
 from gliderwatch.messages.template import with_machine
 from gliderwatch.model import Alert, Assessment, Kind, Segment, SegmentId
+from gliderwatch.navigation.call_fixes import with_call
 from gliderwatch.navigation.clock import moved
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
 from gliderwatch.sea.ocean_field import Field
 from gliderwatch.service import layers as layers_of_sea
+from gliderwatch.service.call_additions import added, keep_call, next_surfacing, touched
 from gliderwatch.service.fields import FieldAdvice, FleetField, look, take
 from gliderwatch.service.layers import GliderLayers
 from gliderwatch.service.routing import Routing, post_alerts, post_due, withdraw_answered
 from gliderwatch.slocum.calls import Dialog
-from gliderwatch.store.codec import plain_encode
 from gliderwatch.store.state_file import File, Status, Store
 
 
@@ -84,7 +86,8 @@ def process_file(
             return FileOutcome(file, alerts=_due_messages(store, glider, params, routing, now))
         file = replace(file, status=Status.TAKEN, reason="")
         store.receive(file, segment.id, segment.last_t, now)
-        assessments, state = _run(store, segment, params, stopping, ocean, layers)
+        first = _place(store, segment)
+        assessments, state = _run(store, first, segment, params, stopping, ocean, layers)
         if fields:
             take(store, fields, store.segments.kept(segment.id))
         advice = look(store, fields, glider, state) if fields and routing is not None else ()
@@ -117,29 +120,46 @@ def process_log(
     params: GliderParams,
     routing: Routing | None,
     now: float,
+    ocean: Field | None = None,
+    layers: GliderLayers | None = None,
+    *,
+    catch_up: bool = True,
 ) -> FileOutcome:
     """Keep what the log of a call tells by `now` (s), and make the messages that are due.
 
-    `dialog` is None where the log could not be read.
+    `dialog` is None where the log could not be read. Where it tells what the file of a dive lacks, that dive
+    and those after it are assessed again; not yet without `catch_up`, as many logs come at once: then
+    `notify_pilots` does. `ocean` and `layers` are as for `process_file`.
+    Raises Quarantine where they cannot be assessed; then nothing has changed.
     """
+    assessments, alerts = tuple[Assessment, ...](), tuple[Alert, ...]()
     with store.transaction():
         store.record(file, now)
         if dialog is not None:
-            store.calls.keep(file.path, dialog.call, plain_encode(dialog), now)
+            keep_call(store, file, dialog, now)
             call = dialog.call
             if call.glider:
                 store.health.put(call.glider, file.path, call.last_t, of_call(call))
-        alerts = (
-            _due_messages(store, file.glider, params, routing, now) if file.status is Status.TAKEN else ()
-        )
-    return FileOutcome(file, alerts=alerts)
+        if file.status is Status.TAKEN:
+            if catch_up:
+                assessments = _catch_up(store, file.glider, params, ocean, layers)
+            alerts = _due_messages(store, file.glider, params, routing, now)
+    return FileOutcome(file, assessments, alerts)
 
 
 def notify_pilots(
-    store: Store, glider: str, params: GliderParams, routing: Routing, now: float
+    store: Store,
+    glider: str,
+    params: GliderParams,
+    routing: Routing,
+    now: float,
+    ocean: Field | None = None,
+    layers: GliderLayers | None = None,
 ) -> tuple[Alert, ...]:
-    """Say what is to be said of a glider without any new input: after a start or a new configuration."""
+    """Say what is to be said of a glider without any new input: after a start or a new configuration, or
+    many logs. Raises Quarantine as `process_log` does."""
     with store.transaction():
+        _catch_up(store, glider, params, ocean, layers)
         return _due_messages(store, glider, params, routing, now)
 
 
@@ -210,22 +230,31 @@ def next_tick(store: Store, glider: str, routing: Routing, now: float) -> float 
     return at if at is None or attention.muted_until is None else max(at, attention.muted_until)
 
 
+def _place(store: Store, segment: Segment) -> SegmentId:
+    """Keep a segment and its readings of health; the first segment that is to be processed from there on."""
+    first, offset = store.segments.place(segment)
+    right = moved(segment, offset)  # by a clock that is right
+    store.health.put(segment.id.glider, right.id.name, right.last_t, of_segment(right))
+    return touched(store, first)
+
+
 def _run(
     store: Store,
-    segment: Segment,
+    first: SegmentId,
+    fresh: Segment | None,
     params: GliderParams,
     stopping: Callable[[], bool],
     ocean: Field | None,
     layers: GliderLayers | None,
 ) -> tuple[tuple[Assessment, ...], GliderState]:
-    state, todo, offset = store.segments.place(segment)
-    right = moved(segment, offset)  # by a clock that is right
-    store.health.put(segment.id.glider, right.id.name, right.last_t, of_segment(right))
+    """Process a segment that is held and all after it; `fresh` is one of them that is at hand, whole."""
+    state, todo = store.segments.resume(first)
     dives: dict[float, Assessment] = {}
-    for identity in todo:
+    for identity, following in zip_longest(todo, todo[1:]):
         if stopping():
-            raise StoppedError(f"{segment.id.name} was not taken in: the daemon ends")
-        one = segment if identity == segment.id else store.segments.get(identity)
+            raise StoppedError(f"{identity.name} was not taken in: the daemon ends")
+        one = fresh if fresh is not None and identity == fresh.id else store.segments.get(identity)
+        one = with_call(one, added(store, one, inf if following is None else following.opened_at))
         outcome = _process(state, one, params, ocean)
         store.keep(identity, outcome)
         if layers is not None:
@@ -234,8 +263,16 @@ def _run(
         dives = {t: a for t, a in dives.items() if t < outcome.since} | {
             a.t_dive: a for a in outcome.assessments
         }
-    store.segments.thin(segment.id.glider)
+    store.segments.thin(first.glider)
     return tuple(dives.values()), state
+
+
+def _catch_up(
+    store: Store, glider: str, params: GliderParams, ocean: Field | None, layers: GliderLayers | None
+) -> tuple[Assessment, ...]:
+    """Process what calls have made outdated."""
+    newest = store.segments.behind(glider)
+    return () if newest is None else _run(store, newest, None, params, lambda: False, ocean, layers)[0]
 
 
 def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: Field | None) -> Outcome:
@@ -257,6 +294,7 @@ def _due_messages(
     """Make the messages that are due of a glider; none while `routing` is None, or while it is muted."""
     if routing is None:
         return ()
+    store.segments.expect_after_call(glider, next_surfacing(store, glider, params, now))
     judged = store.health.judge(glider, routing.limits(glider))
     attention = with_mute(routing.attention(glider), store.notes.muted_until(glider))
     if attention.is_quiet(now):

@@ -29,6 +29,8 @@ _MOST = 50
 """Files, happenings and names kept of one log."""
 _APART = 2 * 86400.0
 """Seconds by which the glider's clock may be off the server's; a time further off is garbled."""
+_OLD = 1800.0
+"""Seconds: a fix that was older when it was printed first may be that of before the dive (rule `fix`)."""
 _ENDS = re.compile(rb"\r\n|\n|\r")
 _PROMPT = re.compile(rb"GliderDos [AIN] -?\d{1,3} ?>\s*\Z")
 
@@ -129,7 +131,9 @@ def _told(call: Call, event: Event, t: float) -> Call:
     """The call after an event at a time (s)."""
     match event:
         case events.Position():
-            call = replace(call, fix=Fix(t - event.age, event.lat, event.lon))
+            fix = Fix(t - event.age, event.lat, event.lon)
+            first = fix if call.surfaced is None and event.age <= _OLD else call.surfaced
+            call = replace(call, fix=fix, surfaced=first)
         case events.Carrier():
             call = replace(call, over=not event.found)
         case events.HangUp():

@@ -146,7 +146,9 @@ def held(db: sqlite3.Connection, glider: str) -> list[SegmentId]:
 
 
 def seed(old: sqlite3.Connection, new: sqlite3.Connection, glider: str) -> None:
-    """Where `state.keep_days` removed what was before a segment, begin after it, with what was known then."""
+    """Begin with its calls. Where `state.keep_days` removed what was before a segment, begin after it, with
+    what was known then."""
+    _insert(new, "calls", old.execute("SELECT * FROM calls WHERE glider = ?", (glider,)).fetchall())
     row = old.execute(
         "SELECT * FROM segments WHERE glider = ? ORDER BY opened_at, name LIMIT 1", (glider,)
     ).fetchone()

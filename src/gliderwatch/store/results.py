@@ -22,6 +22,7 @@ from gliderwatch.model import (
     NextSurfacing,
     Unusable,
 )
+from gliderwatch.navigation.constants import FILE_TO_CALL, SURFACE_STAY
 from gliderwatch.store import codec, segments
 from gliderwatch.store.codec import values
 from gliderwatch.store.database import has_table
@@ -239,6 +240,11 @@ class GliderFacts:
         fixes = [*self.places(1), *(call.fix for call in self.calls(since) if call.fix is not None)]
         return max(fixes, key=lambda fix: fix.t, default=None)
 
+    def came_up(self, t: float) -> str:
+        """Why it came up at a time (s), as it said in the call of that surfacing; empty: not known."""
+        calls = (call for call in self.calls(t - SURFACE_STAY) if call.reason)
+        return next((c.reason for c in calls if c.began - t < FILE_TO_CALL), "")
+
     def not_come(self, since: float, now: float) -> tuple[tuple[float, str], ...]:
         """The flight files that it announced in a call that was over since (s), an hour ago at least, and of
         which none came, under whatever name: when that call began (s), and their names in it."""
@@ -268,6 +274,11 @@ class Calls:
         """How far the log at a path was read, as it was kept; None where it was not."""
         row = self._db.execute("SELECT dialog FROM calls WHERE path = ?", (path,)).fetchone()
         return None if row is None else str(row[0])
+
+    def during(self, glider: str, since: float, until: float) -> tuple[Call, ...]:
+        """The calls of a glider that went on between two times (s), in order of time."""
+        sql = "SELECT call FROM calls WHERE glider = ? AND last_t >= ? AND began <= ? ORDER BY began, path"
+        return tuple(values(self._db, sql, (glider, since, until), Call))
 
     def keep(self, path: str, call: Call, dialog: str, now: float) -> None:
         """Keep what the log at a path tells by now, and how far it was read."""

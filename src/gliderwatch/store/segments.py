@@ -7,7 +7,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import replace
 
-from gliderwatch.model import Segment, SegmentId
+from gliderwatch.model import NextSurfacing, Segment, SegmentId
 from gliderwatch.navigation.clock import (
     SAME_OPENING,
     ClockStep,
@@ -179,6 +179,11 @@ class CheckpointCache:
         kept = self._states.get(first.glider)
         return kept if kept is not None and kept[0] < first else None
 
+    def of(self, identity: SegmentId) -> GliderState | None:
+        """The state after a segment, if that is the one kept of its glider."""
+        kept = self._states.get(identity.glider)
+        return kept[1] if kept is not None and kept[0] == identity else None
+
     def drop(self, glider: str) -> None:
         """Know no state of a glider."""
         self._states.pop(glider, None)
@@ -245,11 +250,9 @@ class Segments:
         ).fetchone()
         return row
 
-    def place(self, segment: Segment) -> tuple[GliderState, list[SegmentId], float]:
-        """Keep a segment (`put`); the state to go on from, the ids of the segments that are to be processed
-        from there on, and what is to be added to its times (s)."""
-        state, after = self.resume(self.put(segment))
-        return state, after, self.offset(segment.id)
+    def place(self, segment: Segment) -> tuple[SegmentId, float]:
+        """Keep a segment (`put`); the first one that this touches, and what is to be added to its times (s)."""
+        return self.put(segment), self.offset(segment.id)
 
     def put(self, segment: Segment) -> SegmentId:
         """Keep a segment in place of an earlier copy; the first id in time that this touches.
@@ -313,6 +316,49 @@ class Segments:
         )
         return [SegmentId(row[0], glider, row[1]) for row in rows]
 
+    def last_before(self, glider: str, t: float) -> SegmentId | None:
+        """The last segment that opened before a time (s)."""
+        row = self._db.execute(
+            "SELECT opened_at, name FROM segments WHERE glider = ? AND opened_at < ? "
+            "ORDER BY opened_at DESC, name DESC LIMIT 1",
+            (glider, t),
+        ).fetchone()
+        return None if row is None else SegmentId(row[0], glider, row[1])
+
+    def outdate(self, first: SegmentId) -> None:
+        """Forget the states after a segment and all later ones: they are to be processed again (`behind`).
+
+        What `state.keep_days` has left of before stays: it can not be made again.
+        """
+        self._db.execute(
+            "UPDATE segments SET checkpoint = NULL WHERE glider = ? AND (opened_at, name) >= (?, ?) "
+            f"AND milestone != {FIRST}",
+            (first.glider, first.opened_at, first.name),
+        )
+        self.ahead.drop(first.glider)
+
+    def behind(self, glider: str) -> SegmentId | None:
+        """The newest segment of a glider, if the state after it is outdated."""
+        newest = self.last_before(glider, float("inf"))
+        if newest is None or self.ahead.of(newest) is not None:
+            return None
+        return newest if self._checkpoint(newest) is None else None
+
+    def newest(self, glider: str) -> GliderState | None:
+        """The state after the newest segment of a glider; None where there is none, or it is outdated."""
+        newest = self.last_before(glider, float("inf"))
+        if newest is None or (ahead := self.ahead.of(newest)) is not None:
+            return None if newest is None else ahead
+        data = self._checkpoint(newest)
+        return None if data is None else codec.decode(data, GliderState)
+
+    def _checkpoint(self, identity: SegmentId) -> bytes | None:
+        data: bytes | None = self._db.execute(
+            "SELECT checkpoint FROM segments WHERE glider = ? AND opened_at = ? AND name = ?",
+            (identity.glider, identity.opened_at, identity.name),
+        ).fetchone()[0]
+        return data
+
     def get(self, identity: SegmentId) -> Segment:
         """A segment that is held, in its right time."""
         row = self._row(identity)
@@ -352,6 +398,19 @@ class Segments:
         self._db.execute("DELETE FROM expected WHERE glider = ? AND opened_at = ? AND segment = ?", key)
         if (e := state.memory.expected) is not None:
             row = (identity.glider, identity.name, identity.opened_at, e.after, codec.plain_encode(e))
+            self._db.execute("INSERT INTO expected VALUES (?, ?, ?, ?, ?)", row)
+
+    def last_surfacing(self, glider: str) -> float:
+        """The last surfacing (s) that the expected one rests upon, by its files; -inf before any."""
+        sql = "SELECT max(after) FROM expected WHERE glider = ? AND segment != ''"
+        found: float | None = self._db.execute(sql, (glider,)).fetchone()[0]
+        return float("-inf") if found is None else found
+
+    def expect_after_call(self, glider: str, expected: NextSurfacing | None) -> None:
+        """Keep the surfacing that the last call leads to expect, where its file is still to come."""
+        self._db.execute("DELETE FROM expected WHERE glider = ? AND segment = ''", (glider,))
+        if expected is not None:
+            row = (glider, "", expected.after, expected.after, codec.plain_encode(expected))
             self._db.execute("INSERT INTO expected VALUES (?, ?, ?, ?, ?)", row)
 
     def thin(self, glider: str) -> None:
