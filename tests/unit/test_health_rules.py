@@ -65,21 +65,24 @@ WARNING, CRITICAL = Severity.WARNING, Severity.CRITICAL
         ("battery_charge", "battery_charge", [0.21, 0.21], None),
         ("battery_charge", "battery_charge", [0.19, 0.19], WARNING),
         ("battery_charge", "battery_charge", [0.14, 0.14], CRITICAL),
-        ("mission_time", "mission_time", [39 * DAY], None),
-        ("mission_time", "mission_time", [41 * DAY], WARNING),
-        ("mission_time", "mission_time", [44.5 * DAY], CRITICAL),
+        ("mission_time", "mission_time", [39 * DAY, 39.1 * DAY], None),
+        ("mission_time", "mission_time", [41 * DAY, 41.1 * DAY], WARNING),
+        ("mission_time", "mission_time", [44.5 * DAY, 44.6 * DAY], CRITICAL),
         ("memory", "heap_free", [283620.0] * 2, None),
         ("memory", "heap_free", [59e3] * 2, WARNING),
         ("memory", "heap_free", [49e3] * 2, CRITICAL),
         ("memory", "disk_free", [99e6] * 2, WARNING),
         ("fix", "fix_age", [29 * 60.0, 29 * 60.0], None),
         ("fix", "fix_age", [31 * 60.0, 31 * 60.0], WARNING),
-        ("devices", "errors:digifin", [0, 0, 1], CRITICAL),
-        ("devices", "errors:argos", [3, 4], WARNING),
-        ("devices", "errors:all", [7, 0], None),  # a reset
-        ("devices", "warnings:all", [1, 11], WARNING),
-        ("devices", "oddities:all", [277, 277 + 1001], WARNING),
-        ("devices", "oddities:all", [277, 277 + 999], None),
+        ("devices", "errors:digifin", [0, 0, 1, 1], CRITICAL),
+        ("devices", "errors:digifin", [0, 0, 8, 0], None),  # a garbled digit
+        ("devices", "warnings:all", [1, 91, 1], None),
+        ("mission_time", "mission_time", [4 * DAY, 44.5 * DAY, 4.1 * DAY], None),
+        ("devices", "errors:argos", [3, 4, 4], WARNING),
+        ("devices", "errors:all", [7, 0, 0], None),  # a reset
+        ("devices", "warnings:all", [1, 11, 11], WARNING),
+        ("devices", "oddities:all", [277, 277 + 1001, 277 + 1002], WARNING),
+        ("devices", "oddities:all", [277, 277 + 999, 277 + 999], None),
     ],
 )
 def test_limits(rule: str, name: str, values: list[float], expected: Severity | None) -> None:
@@ -240,6 +243,16 @@ class TestReadings:
         v[500:900] = 2.42
         thin = of_segment(self.segment(leak_voltage=series(v.tolist(), step=4.0)))["leak_voltage"]
         assert len(thin) <= 40 and thin.v.min() == 2.42 and thin.v[-1] == 2.49
+
+    def test_lowest_altitude_of_each_turn(self) -> None:
+        """Sampled once a minute: 3.3 m up is noise, 7 m are another turn; nothing for 7 min is one turn, and
+        nothing for 11 min are two."""
+        first = [30.0, 14.0, 6.0, 13.0, 6.5, 20.0, 30.0, 14.0, 7.0, 10.5, 7.2, 25.0, 14.0, 8.0]
+        parts = [(0.0, first), (13 * 60 + 420.0, [12.0, 30.0, 9.5]), (15 * 60 + 420 + 660.0, [5.0, 12.0])]
+        runs = [series(v, T0 + start, 60.0) for start, v in parts]
+        t, v = (np.concatenate([getattr(run, name) for run in runs]) for name in "tv")
+        turns = of_segment(self.segment(altitude=Series(readonly(t), readonly(v))))["altitude"]
+        assert turns.v.tolist() == [6.0, 6.5, 7.0, 8.0, 9.5, 5.0]
 
     def test_readings_of_a_call(self) -> None:
         call = Call(

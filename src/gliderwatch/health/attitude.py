@@ -23,9 +23,8 @@ def _altitude(history: History, limits: Limits) -> Finding | None:
     low = run(history, "altitude", lambda v: v < factor * least)
     if low is None:
         return None
-    text = (
-        f"{low.v.min():.1f} m above the bottom, twice in a row below {factor:g} x the minimum of {least:g} m"
-    )
+    limit = f"{factor:g} x the minimum of {least:g} m"
+    text = f"{low.v.min():.1f} m above the bottom, at two turns in a row below {limit}"
     return found("altitude", Severity.WARNING, float(low.t[0]), text, history, "altitude")
 
 
@@ -91,9 +90,9 @@ ALTITUDE = Rule(
     _altitude,
     (
         Limit("minimum", None, "m", 0.1, 1000, "Below where it is meant to turn; null: the rule is off."),
-        Limit("factor", 1.5, "", 1, 100, "Two readings in a row below so many times that are a warning."),
+        Limit("factor", 1.5, "", 1, 100, "Two turns in a row below so many times that are a warning."),
     ),
-    "The height above the bottom.",
+    "The height above the bottom where it turns.",
 )
 ROLL = Rule(
     "roll",

@@ -27,6 +27,11 @@ SURFACE = 2.0
 """Metres above which the glider is at the surface, with its air bladder full."""
 FLIGHT = 5.0
 """Metres below which it flies: roll and vacuum are those of flight."""
+APPROACH = 5.0
+"""Metres by which a glider has to go away from the bottom between two approaches of it: noise of an
+altimeter, and a bottom that is not even, make less."""
+OUT_OF_RANGE = 600.0
+"""Seconds without altitudes that part two approaches: the bottom was out of the altimeter's range."""
 
 FEWEST = 5
 """Positions of a motor in flight that tell how it follows its commands (measured: fewer are those of a

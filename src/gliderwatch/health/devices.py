@@ -25,13 +25,11 @@ def _devices(history: History, limits: Limits) -> Finding | None:
         severity = Severity.CRITICAL if device in CRITICAL_DEVICES else Severity.WARNING
         what = "a device" if device == "all" else f"device {device}"
         findings.append(found("devices", severity, t, f"a new error of {what}", history, name))
-    warnings = history.get("warnings:all")
     most, burst = limits["warnings"], limits["oddities"]
-    if most is not None and "warnings:all" in history.fresh and warnings.v[-1] > most:
-        text = f"{warnings.v[-1]:.0f} warnings of devices in one segment, more than {most:.0f}"
-        findings.append(
-            found("devices", Severity.WARNING, float(warnings.t[-1]), text, history, "warnings:all")
-        )
+    many = None if most is None else run(history, "warnings:all", lambda v: v > most)
+    if many is not None and most is not None:
+        text = f"{many.v[-1]:.0f} warnings of devices in one segment, more than {most:.0f}"
+        findings.append(found("devices", Severity.WARNING, float(many.t[0]), text, history, "warnings:all"))
     if burst is not None and (t := _growth(history, "oddities:all", burst)) is not None:
         text = f"more than {burst:.0f} oddities of devices at once"
         findings.append(found("devices", Severity.WARNING, t, text, history, "oddities:all"))
@@ -39,24 +37,27 @@ def _devices(history: History, limits: Limits) -> Finding | None:
 
 
 def _growth(history: History, name: str, least: float) -> float | None:
-    """When (s) a count that is fresh grew by so much at once; one that falls was reset."""
+    """When (s) a count grew by so much at once, as two readings in a row show, of which one is fresh.
+
+    One that falls was reset; a garbled digit is in one reading alone.
+    """
     series, since = history.get(name), history.fresh_from(name)
-    if len(series) < 2:
+    if len(series) < 3:
         return None
-    at = np.flatnonzero((np.diff(series.v) >= least) & (series.t[1:] >= since))
+    before, first, second = series.v[:-2], series.v[1:-1], series.v[2:]
+    grew = (first - before >= least) & (second - before >= least) & (series.t[2:] >= since)
+    at = np.flatnonzero(grew)
     return float(series.t[1 + at[-1]]) if len(at) else None
 
 
 def _mission_time(history: History, limits: Limits) -> Finding | None:
-    series = history.get("mission_time")
-    now = float(series.v[-1])
     for which, severity in (("critical", Severity.CRITICAL), ("warning", Severity.WARNING)):
         limit = limits[which]
-        if limit is not None and now > limit:
-            text = (
-                f"the mission runs for {now / DAY:.1f} days, more than {limit / DAY:.0f}; it may abort at 45"
-            )
-            return found("mission_time", severity, float(series.t[-1]), text, history, "mission_time")
+        long = None if limit is None else run(history, "mission_time", lambda v, x=limit: v > x)  # type: ignore[misc]
+        if long is not None and limit is not None:
+            days = f"{long.v[-1] / DAY:.1f} days, more than {limit / DAY:.0f}"
+            text = f"the mission runs for {days}; it may abort at 45"
+            return found("mission_time", severity, float(long.t[0]), text, history, "mission_time")
     return None
 
 

@@ -9,14 +9,17 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import find_peaks
 
 from gliderwatch.health.constants import (
+    APPROACH,
     ATMOSPHERE,
     BINS,
     FEWEST,
     FLIGHT,
     KELVIN,
     KEPT,
+    OUT_OF_RANGE,
     PAUSE,
     REMEMBERED,
     SAME_READING,
@@ -28,7 +31,7 @@ from gliderwatch.model import EMPTY, Array, Call, Segment, Series, readonly
 Readings = Mapping[str, Series]
 """What one file or call shows: times (s) and values (SI) by quantity, in order of time."""
 
-LOWEST = ("leak_voltage", "leak_voltage_forward", "leak_voltage_science", "digifin_leak", "altitude")
+LOWEST = ("leak_voltage", "leak_voltage_forward", "leak_voltage_science", "digifin_leak")
 """Quantities of which low values are bad: of many readings the lowest count, but for single ones."""
 PLAIN = ("vacuum", "battery_voltage", "heap_free", "disk_free")
 LATEST = ("battery_charge", "charge_used", "mission_time")
@@ -100,6 +103,7 @@ def of_segment(segment: Segment) -> Readings:
     depth = get("depth")
     for name in LOWEST:
         _put(out, name, _thinned(get(name), np.min))
+    _put(out, "altitude", _turns(get("altitude")))
     for name in PLAIN:
         _put(out, name, _thinned(get(name), np.median))
     for name in LATEST:
@@ -134,6 +138,24 @@ def of_call(call: Call) -> Readings:
 def _is_cut(call: Call) -> bool:
     """Whether the transfer of a file began in a call and was not done."""
     return bool(set(call.announced) - set(call.sent))
+
+
+def _turns(altitude: Series) -> Series:
+    """The lowest altitude of each approach of the bottom.
+
+    A glider is near the bottom for some seconds a yo: of a file with one sample a minute two in a row are
+    never both low.
+    """
+    if not len(altitude):
+        return EMPTY
+    lowest: list[int] = []
+    edges = [0, *(1 + np.flatnonzero(np.diff(altitude.t) > OUT_OF_RANGE)).tolist(), len(altitude)]
+    for i, j in pairwise(edges):
+        v = altitude.v[i:j]
+        far = float(v.max()) + APPROACH
+        at, _ = find_peaks(-np.concatenate([[far], v, [far]]), prominence=APPROACH)
+        lowest += (at - 1 + i).tolist()
+    return _at(altitude, np.array(lowest[-KEPT:], dtype=np.intp))
 
 
 def _vacuum(vacuum: Series, temperature: Series, depth: Series, t: float) -> Readings:

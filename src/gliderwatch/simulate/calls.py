@@ -24,6 +24,8 @@ from gliderwatch.simulate.telemetry import TIME, SegmentData
 SERVER_AHEAD = 15.0
 """Seconds by which the server's clock, which names the logs, is ahead of the glider's."""
 _LINES_A_SECOND = 4.0
+_STATUS_EVERY = 20.0
+"""Seconds after which the status is printed anew at the soonest (two public logs: 20 to 60)."""
 _CUT = 0.4
 """Part of a call after which it is dropped."""
 
@@ -58,11 +60,15 @@ class CallRates:
 
 @dataclass(frozen=True, slots=True)
 class CallLog:
-    """A log: its file ``name``, its ``lines`` with their ends, each with the time (s) when it is written."""
+    """A log: its file ``name``, its ``lines`` with their ends, each with the time (s) when it is written.
+
+    ``fate`` is what became of the call, ``pilot`` whether one typed in it.
+    """
 
     name: str
     lines: tuple[tuple[float, bytes], ...]
     fate: Fate
+    pilot: bool
 
     @property
     def begun(self) -> float:
@@ -92,19 +98,22 @@ def call_logs(
         if is_lost:
             fate = Fate.GLIDER_DOS if is_reported else Fate.ABORT
             is_reported = True
-        files = [s.segment for s in sendings]
+        files, pilot = [s.segment for s in sendings], bool(typing.random() < rates.typing)
         lines = [
+            "Connection Event: Carrier Detect found.    Iridium console active and ready...",
             *_status(mission, t, fate, closing.before(t)),
             *_devices(scenario.start, t, ailments),
             *_aborted(rates, fate, is_lost),
-            *(_TYPED if typing.random() < rates.typing else ()),
+            *(_TYPED if pilot else ()),
             *(_transfers(files, scenario.glider, form) if fate in (Fate.USUAL, Fate.DROPPED) else ()),
         ]
+        later = t + max(len(lines) / _LINES_A_SECOND, _STATUS_EVERY)
+        lines += _status(mission, later, Fate.GLIDER_DOS if is_lost else fate, closing.before(t))
+        lines += _devices(scenario.start, later, ailments)
         lines = lines[: int(_CUT * len(lines))] if fate is Fate.DROPPED else [*lines, *_end(fate, is_lost)]
         end = b"\r\n" if chance[2] < 0.5 else b"\n"
-        yield CallLog(
-            _name(scenario.glider, t, modem=chance[3] < 0.5), _written(lines, t, end, rates, rng), fate
-        )
+        name = _name(scenario.glider, t, modem=chance[3] < 0.5)
+        yield CallLog(name, _written(lines, t, end, rates, rng), fate, pilot)
 
 
 def _fate(rates: CallRates, ailments: tuple[Ailment, ...], t: float, chance: Array) -> Fate:
@@ -144,12 +153,11 @@ def _name(glider: str, t: float, *, modem: bool) -> str:
 def _status(mission: Mission, t: float, fate: Fate, segment: SegmentData | None) -> list[str]:
     glider, start = mission.scenario.glider, mission.scenario.start
     dive = next((d for d in reversed(mission.truth) if d.t_surface <= t), None)
-    now = datetime.fromtimestamp(t, UTC)
-    head = ["Connection Event: Carrier Detect found.    Iridium console active and ready..."]
+    now, head = datetime.fromtimestamp(t, UTC), list[str]()
     if fate is not Fate.GLIDER_DOS and segment is not None:
         header, short = segment.header, segment.header.short_name
         name = "lastgasp.mi" if fate is Fate.LASTGASP else "sim.mi"
-        head += [
+        head = [
             f"Glider {glider} at surface.",
             "Because:timeout expired [behavior surface_4 start_when = 2.0]",
             f"MissionName:{name} MissionNum:{header.full_name} ({short[:4]}.{short[4:]})",

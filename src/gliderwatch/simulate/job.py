@@ -115,7 +115,10 @@ def write_truth(
 
 def _calls(logs: Sequence[CallLog]) -> dict[str, Any]:
     """What became of each call."""
-    calls = [{"log": log.name, "begun_seconds": log.begun, "fate": str(log.fate)} for log in logs]
+    calls = [
+        {"log": log.name, "begun_seconds": log.begun, "fate": str(log.fate), "pilot_types": log.pilot}
+        for log in logs
+    ]
     return {"calls": calls} if calls else {}
 
 
@@ -271,7 +274,7 @@ def call_rates(abort: str | None) -> CallRates:
 
     Raises `ConfigError` for an abort that is none.
     """
-    usual = CallRates(dropped=0.03, no_file=0.03, garbled=0.002)
+    usual = CallRates(dropped=0.03, no_file=0.03, garbled=0.002, typing=0.1)
     if abort is None:
         return usual
     match = re.fullmatch(r"([A-Za-z_]{1,40})@(\d+(?:\.\d+)?)", abort)
