@@ -6,7 +6,9 @@ import random
 import shutil
 import time
 from collections.abc import Callable
+from contextlib import closing
 from itertools import pairwise
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +26,12 @@ from acceptance.support import (
     results,
     until,
 )
+from gliderwatch.simulate.calls import CallRates, call_logs
 from gliderwatch.simulate.delivery import FileForm, Names, arrivals
+from gliderwatch.simulate.glider import simulate
+from gliderwatch.simulate.scenario import FixIn, Mission, Scenario
 from gliderwatch.slocum.header import read_header
-from gliderwatch.store.state_file import Status
+from gliderwatch.store.state_file import Status, Store
 
 KILLS = 5
 
@@ -154,6 +159,69 @@ def test_kills_at_commit_points_and_at_random_lose_nothing(tmp_path: Path) -> No
     assert chaos.tally.kills.total() == 12 and sum("commit" in where for where in chaos.tally.kills) > 2
     assert chaos.tally.dives > 40 and chaos.tally.copies > 8
     assert list(chaos.daemon.scratch.iterdir()) == []
+
+
+Piece = tuple[Path, bytes]
+
+
+def pieces(site: Site, mission: Mission, chance: random.Random) -> list[Piece]:
+    """The files of a mission in any order, and among them its logs, each of which grows in three pieces."""
+    folder, logs = site.folder("cora"), site.folder("cora").with_name("logs")
+    logs.mkdir()
+    grown: list[list[Piece]] = [[(folder / file.name, file.data)] for file in arrivals(mission)]
+    for log in call_logs(mission, CallRates(garbled=0.005, typing=0.1, abort=0.6)):
+        data = b"".join(line for _, line in log.lines)
+        cuts = [0, *sorted(chance.sample(range(1, len(data)), 2)), len(data)]
+        grown.append([(logs / log.name, data[a:b]) for a, b in pairwise(cuts)])
+    out = []
+    while grown:
+        one = chance.choice(grown)
+        out.append(one.pop(0))
+        grown = [rest for rest in grown if rest]
+    return out
+
+
+def of_calls(state: Path) -> list[tuple[object, ...]]:
+    """The calls in a state file, what rules of health found, and of which aborts people were notified."""
+    with closing(Store.reading(state)) as store:
+        told = [report.what for episode in store.notified("cora").aborts for report in episode.told]
+        calls = store.facts("cora").calls(0.0)
+        return [calls, store.health.judged("cora"), sorted(told), store.facts("cora").expected(inf)]
+
+
+@pytest.mark.slow
+def test_logs_that_grow_and_a_kill_in_the_midst_of_them_end_as_a_replay_does(tmp_path: Path) -> None:
+    """The files lack the fix at the surface, which the logs have: so their dives hang on both."""
+    site, chance = Site(tmp_path), random.Random(3)
+    start = float(int(time.time() - 86400))  # an abort of last week is history, not news
+    mission = simulate(Scenario(seed=6, glider="cora", days=1.0, start=start, fix_in=FixIn.NEXT))
+    site.caches(mission)
+    given = pieces(site, mission, chance)
+    cut = [k for k, (path, _) in enumerate(given) if any(path == other for other, _ in given[k + 1 :])]
+    fatal = chance.sample(cut, 2)  # of these logs more is to come
+    with mail_server() as box:
+        site.configure("cora", url=box.url)
+        with Daemon(site) as daemon:
+            for number, (path, data) in enumerate(given):
+                with path.open("ab") as file:
+                    file.write(data)
+                if number in fatal:
+                    time.sleep(chance.uniform(0.0, 0.3))
+                    daemon.kill()
+                    daemon.start()
+            sizes = {path.name: path.stat().st_size for path, _ in given}
+            until(lambda: {n: f.size for n, f in site.files().items()} == sizes, "all files judged", 180.0)
+            until(lambda: site.undelivered() == 0, "all delivered")
+            assert daemon.stop() == 0
+    assert TRACEBACK not in daemon.text()
+    aborts = {mail.id for mail in box.mails if mail.subject == "cora ABORTED: leak"}
+    assert len(aborts) == 1
+    out = tmp_path / "out"
+    replay = command("run", "-c", site.config, "--replay", site.root, "--out", out)
+    assert replay.returncode == 0, replay.stderr
+    assert sum(len(dives) for dives, _ in results(site.state).values()) > 5
+    assert results(site.state) == results(out / "replay.sqlite")
+    assert of_calls(site.state) == of_calls(out / "replay.sqlite")
 
 
 class Cutting(Mailbox):
