@@ -4,8 +4,8 @@
     python benchmarks/logs.py damaged [--logs 1000] [--data ../shared/data/logs]
 
 `lines`: gliders call, and in the log of one after another a line says that it aborts; seconds from that line
-to the mail that a local server has accepted. `damaged`: lines lost, doubled, moved and overwritten, the end cut,
-of public logs and simulated ones; beside them one of 1 GB, and two just below what is read of a log. The
+to the mail that a local server has accepted. `damaged`: lines lost, doubled, moved and overwritten, the end
+cut, of public logs and simulated ones; beside them one of 1 GB, and two just below what is read of a log. The
 installed command replays them; counted are those that the ledger names, and the memory at the most.
 """
 
@@ -155,8 +155,7 @@ def damaged(n: int, data: Path) -> None:
     print(f"not in the ledger: {len(there - ledger.keys())}; not taken and without a reason: {len(mute)}")
     print(f"the huge one: {ledger['huge_20250126T072155.log'].reason}")
     print(f"memory at the most: {resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024:.0f} MB")
-    if "Traceback" in done.stderr:
-        print(done.stderr)
+    print(f"its last line of errors: {(done.stderr.strip().splitlines() or [''])[-1]}")
 
 
 def main() -> None:
