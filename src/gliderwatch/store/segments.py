@@ -251,7 +251,7 @@ class Segments:
         return row
 
     def place(self, segment: Segment) -> tuple[SegmentId, float]:
-        """Keep a segment (`put`); the first one that this touches, and what is to be added to its times (s)."""
+        """Keep a segment (`put`); the first one that this touches, and what to add to its times (s)."""
         return self.put(segment), self.offset(segment.id)
 
     def put(self, segment: Segment) -> SegmentId:
