@@ -9,6 +9,7 @@ import click
 
 from gliderwatch import __version__
 from gliderwatch.cli.export import COMMANDS as EXPORTING
+from gliderwatch.cli.hindcast import hindcast
 from gliderwatch.cli.layers import layers
 from gliderwatch.cli.look import LOOKING
 from gliderwatch.cli.manage import COMMANDS
@@ -27,5 +28,5 @@ def main() -> None:
             stream.reconfigure(errors="replace")
 
 
-for command in (run, *LOOKING, *COMMANDS, *EXPORTING, pages, web, layers, simulate, score):
+for command in (run, *LOOKING, *COMMANDS, *EXPORTING, pages, web, layers, hindcast, simulate, score):
     main.add_command(command)

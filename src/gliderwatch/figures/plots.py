@@ -6,8 +6,10 @@ The colours are those of Okabe and Ito (2008), which the colour-blind can tell; 
 from __future__ import annotations
 
 import io
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +24,8 @@ AREA = (0.13, 0.19, 0.85, 0.6)
 TOP = 0.91
 """Height of its key."""
 _MARKS = (("^", COLOURS[1]), ("D", COLOURS[4]))
+_ABOUT = ("Date", "Creator", "Format", "Type")
+"""What matplotlib would say of itself in an SVG, with the addresses of vocabularies: nothing is."""
 _DASHES = ("-", "--", ":", "-.")
 
 
@@ -90,9 +94,24 @@ def library() -> Any:
 
 def png(panel: Panel) -> bytes:
     """The panel as PNG, on white, with its name: for a mail."""
+    return as_png(page_figure(panel))
+
+
+def page_figure(panel: Panel) -> Any:
+    """The panel with its name as a figure of matplotlib, for a page of paper."""
     figure = _drawn(panel)
     figure.text(AREA[0], 0.975, panel.name, va="top", fontsize=10, fontweight="bold")
-    return as_png(figure)
+    return figure
+
+
+def write_pdf(path: Path, title: str, figures: Iterable[Any]) -> None:
+    """Write figures of matplotlib as PDF, a page each; the same figures give the same bytes."""
+    library()
+    from matplotlib.backends.backend_pdf import PdfPages  # noqa: PLC0415
+
+    with PdfPages(path, metadata={"Title": title, "CreationDate": None}) as paper:
+        for figure in figures:
+            paper.savefig(figure)
 
 
 def as_png(figure: Any) -> bytes:
@@ -105,7 +124,7 @@ def as_png(figure: Any) -> bytes:
 def as_svg(figure: Any) -> str:
     """A figure of matplotlib as an `svg` element; the same figure gives the same text."""
     out = io.StringIO()
-    figure.savefig(out, format="svg", transparent=True, metadata={"Date": None})
+    figure.savefig(out, format="svg", transparent=True, metadata=dict.fromkeys(_ABOUT))
     return out.getvalue()[out.getvalue().index("<svg") :]
 
 

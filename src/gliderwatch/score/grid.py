@@ -59,6 +59,11 @@ def configuration(name: str, glider: str, low: float, high: float) -> Config:
         settings["normal_speed"] = {"min": round(low, 4), "max": round(high, 4)}
     if preset:
         settings["preset"] = preset
+    return configured(glider, settings)
+
+
+def configured(glider: str, settings: Mapping[str, Any]) -> Config:
+    """The configuration of one glider with some settings, read from a file as a pilot's own."""
     document = {"dockserver": {"roots": ["."]}, "gliders": {glider: settings}}
     with TemporaryDirectory(prefix="gliderwatch-") as folder:
         path = Path(folder) / "gliderwatch.yml"

@@ -90,3 +90,11 @@ POINTS = 8
 """Places along the way of a dive at which a field is read."""
 FASTEST_CURRENT = 10.0
 """m/s: no current is faster; above it a value is a fill value that the file does not call one."""
+
+# The smoother of missions that are over
+KNOT = 1800.0
+"""s: currents are given so often at the least; a semidiurnal tide turns by 15 degrees in it."""
+START_SIGMA = 1.0
+"""m: error of the displacement where a dive begins, that of two fixes after each other."""
+SEA_SCALES = (0.1, 0.3, 1.0, 3.0, 10.0)
+"""Factors on the noise of what is no tide, of which the one is taken that fits the mission best."""

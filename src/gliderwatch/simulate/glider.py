@@ -86,11 +86,11 @@ def _launch(scenario: Scenario) -> Glider:
     ]
     place, origin = scenario.place, scenario.origin or scenario.place
     east, north = displacement(origin, place)
-    ocean, chance = _sea(scenario), (scenario.rng(1), scenario.rng(2))
+    ocean, chance = sea_of(scenario), (scenario.rng(1), scenario.rng(2))
     return Glider(scenario, ocean, *chance, logs[0], logs[1], place, place, place, east, north)
 
 
-def _sea(scenario: Scenario) -> Ocean:
+def sea_of(scenario: Scenario) -> Ocean:
     """The sea of the scenario, the same for all gliders of a fleet."""
     rng = np.random.default_rng(np.random.SeedSequence(scenario.seed, spawn_key=(0,)))
     end = scenario.start + 86400 * (scenario.days + 1) + 2 * scenario.interval

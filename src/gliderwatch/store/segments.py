@@ -308,6 +308,10 @@ class Segments:
             return GliderState(), self._after(first.glider, float("-inf"), "")
         return codec.decode(row[2], GliderState), self._after(first.glider, row[0], row[1])
 
+    def of(self, glider: str) -> list[SegmentId]:
+        """The ids of all segments of a glider, in order of time."""
+        return self._after(glider, float("-inf"), "")
+
     def _after(self, glider: str, opened_at: float, name: str) -> list[SegmentId]:
         rows = self._db.execute(
             "SELECT opened_at, name FROM segments WHERE glider = ? AND (opened_at, name) > (?, ?) "

@@ -1,0 +1,149 @@
+"""The figures of a hindcast, those of paper 000, and the numbers in them as NetCDF."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+
+from gliderwatch import __version__
+from gliderwatch.archive.hindcast import Evidence
+from gliderwatch.errors import GliderwatchError
+from gliderwatch.export.netcdf import SINCE
+from gliderwatch.figures import dives, plots
+from gliderwatch.figures.plots import Line, Panel
+from gliderwatch.model import Array, Assessment
+from gliderwatch.navigation.geodesy import displacement, from_plane
+
+TRACK = "Track"
+"""Name of the figure that is no panel over time."""
+
+
+def panels(evidence: Evidence) -> list[Panel]:
+    """The panels over time: CLLE, speed and flow, what corroborates, currents in delayed mode."""
+    some = evidence.best
+    made = [*_clle(some), *dives.panels(some)]
+    if evidence.delayed is not None:
+        made += _delayed(evidence)
+    return made
+
+
+def _clle(some: Sequence[Assessment]) -> list[Panel]:
+    found = [(d.t_surface, d.clle_max) for d in some if d.clle_max is not None]
+    if not found:
+        return []
+    t, v = np.array(found, dtype=float).T
+    shows = (
+        "The largest controlled Lagrangian localisation error of each dive: how far the learnt trajectory is "
+        "from the one flown. It falls as speed and flow are learnt, and rises where either changes."
+    )
+    return [Panel("CLLE", "error (m)", shows, (Line("largest of the dive", t, v),), zero=True)]
+
+
+def _delayed(evidence: Evidence) -> list[Panel]:
+    assert evidence.delayed is not None
+    found, made = evidence.delayed.delayed, []
+    t = np.array([(one.start + one.end) / 2 for one in evidence.measured])
+    for i, way in enumerate(("east", "north")):
+        lines = (
+            Line("current", found.t, found.total[:, i]),
+            Line("residual", found.t, found.residual[:, i]),
+            Line("tide", found.t, found.tide[:, i]),
+            Line("mean of a dive", t, np.array([one.current[i] for one in evidence.measured]), joined=False),
+        )
+        shows = (
+            f"The instantaneous current to the {way} in delayed mode, by all dives before and after, its "
+            "tide and its residual, and what each dive measured."
+        )
+        made.append(Panel(f"Delayed mode, {way}", f"{way} (m/s)", shows, lines))
+    return made
+
+
+def track(evidence: Evidence) -> tuple[Array, Array]:
+    """Fixes (degrees, (n, 2): latitude, longitude) at the surfacings, and where the estimated speed and flow
+    would have led from the one before ((n, 2), NaN where there is no estimate)."""
+    some = [d for d in evidence.best if d.lat is not None and d.lon is not None]
+    fixes = np.array([(d.lat, d.lon) for d in some], dtype=float).reshape(-1, 2)
+    led = np.full(fixes.shape, np.nan)
+    for i in range(1, len(some)):
+        one, before = some[i], some[i - 1]
+        if one.speed is None or one.flow_u is None or one.flow_v is None:
+            continue
+        drift = np.array([one.flow_u, one.flow_v]) * (one.t_surface - before.t_surface)
+        # The heading as the ground track and the flow have it: the estimate is of speed and flow alone.
+        through = displacement(*fixes[i], *fixes[i - 1]) - drift
+        length = float(np.hypot(*through))
+        if length > 0:
+            way = drift + through / length * one.speed * (one.t_surface - one.t_dive)
+            led[i] = from_plane(way, *fixes[i - 1])
+    return fixes, led
+
+
+def track_figure(evidence: Evidence) -> Any:
+    """The track with where the estimate leads, and the basis functions of the papers' law."""
+    fixes, led = track(evidence)
+    figure = plots.library().figure.Figure(figsize=(5.4, 4.6), layout="constrained")
+    axis = figure.add_subplot()
+    axis.plot(fixes[:, 1], fixes[:, 0], "-", color=plots.COLOURS[0], linewidth=1.2, label="surfacings")
+    good = np.isfinite(led).all(axis=1)
+    axis.plot(led[good, 1], led[good, 0], "x", color=plots.COLOURS[1], markersize=4, label="by the estimate")
+    if len(evidence.centres):
+        c = evidence.centres
+        axis.plot(c[:, 1], c[:, 0], "o", color=plots.COLOURS[2], markersize=5, label="basis functions")
+    middle = float(np.mean(fixes[:, 0])) if len(fixes) else 0.0
+    axis.set_aspect(1 / max(np.cos(np.radians(middle)), 0.1), adjustable="datalim")
+    axis.set(xlabel="longitude (degrees)", ylabel="latitude (degrees)")
+    axis.legend(fontsize=8, frameon=False)
+    return figure
+
+
+def write_numbers(path: Path, evidence: Evidence, made: Sequence[Panel]) -> None:
+    """Write what the figures show, a group a figure. Raises GliderwatchError where it cannot be written."""
+    try:
+        with netCDF4.Dataset(path, "w") as data:
+            data.setncatts({"Conventions": "CF-1.8", "source": f"gliderwatch {__version__}"})
+            fixes, led = track(evidence)
+            group = data.createGroup("track")
+            for name, values in (
+                ("surfacing", fixes),
+                ("estimate", led),
+                ("basis_function", evidence.centres),
+            ):
+                group.createDimension(name, len(values))
+                for i, (axis, unit) in enumerate((("lat", "degrees_north"), ("lon", "degrees_east"))):
+                    _put(group, f"{name}_{axis}", name, values[:, i], unit, f"{name} {axis}")
+            for panel in made:
+                _panel(data.createGroup(_word(panel.name)), panel)
+    except (OSError, RuntimeError) as error:
+        raise GliderwatchError(f"{path} cannot be written: {error}") from None
+
+
+def _panel(group: netCDF4.Group, panel: Panel) -> None:
+    unit = found[1] if (found := re.search(r"\(([^)]*)\)$", panel.unit)) else "1"
+    group.setncatts({"title": panel.name, "comment": panel.shows})
+    for line in panel.lines:
+        name = _word(line.label)
+        group.createDimension(name, len(line.t))
+        _put(group, f"{name}_time", name, line.t, SINCE, f"time of {line.label}")
+        _put(group, name, name, line.v, unit, line.label)
+        if line.sigma is not None:
+            _put(group, f"{name}_sigma", name, line.sigma, unit, f"standard error of {line.label}")
+    if panel.band is not None:
+        t, low, high = panel.band
+        group.createDimension("normal", len(t))
+        for name, values, each in (("time", t, SINCE), ("low", low, unit), ("high", high, unit)):
+            _put(group, f"normal_{name}", "normal", values, each, f"normal range, {name}")
+
+
+def _put(group: netCDF4.Group, name: str, dimension: str, values: Array, unit: str, words: str) -> None:
+    variable = group.createVariable(name, "f8", (dimension,), fill_value=np.nan)
+    variable.setncatts({"units": unit, "long_name": words})
+    variable[:] = values
+
+
+def _word(name: str) -> str:
+    return re.sub(r"\W+", "_", name.lower()).strip("_")

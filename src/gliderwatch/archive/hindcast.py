@@ -1,0 +1,278 @@
+"""One mission judged again: by its full files as what could be known, and by what was sent as if online."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from gliderwatch import __version__
+from gliderwatch.archive.missions import Mission, is_full, local
+from gliderwatch.errors import GliderwatchError
+from gliderwatch.estimation.dive_measurement import observe
+from gliderwatch.model import Array, Assessment, Dive, Incident, SegmentId, readonly
+from gliderwatch.navigation.dives import Navigation, extend
+from gliderwatch.score.grid import check, configured
+from gliderwatch.sea.gauss_markov import FlowParams
+from gliderwatch.sea.smoother import Delayed, MeanCurrent, smooth
+from gliderwatch.service.replay import Request, replay
+from gliderwatch.service.replay_files import find_files
+from gliderwatch.slocum.folders import is_cache
+from gliderwatch.store.state_file import Store
+
+MONTH = 30 * 86400.0
+SAME = 600.0
+"""s: dives of full files and of files as sent that begin so near to each other are one dive."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """An incident: its ``kind``, ``since`` (s, the first dive in it), ``opened_at`` (s, the surfacing at
+    which a pilot would have known) and ``cleared_at`` (s, None: open at the end)."""
+
+    kind: str
+    since: float
+    opened_at: float
+    cleared_at: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """A mission judged by one kind of its files.
+
+    ``dives`` of which ``flags`` counts each flag (`none`: not judged), between ``start`` and ``end`` (s);
+    medians of ``speed`` and of the ``current`` (m/s).
+    """
+
+    dives: int
+    flags: dict[str, int]
+    start: float
+    end: float
+    speed: float | None
+    current: float | None
+    incidents: tuple[Found, ...]
+
+    @property
+    def months(self) -> float:
+        """How long it flew, in months of 30 days."""
+        return (self.end - self.start) / MONTH
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """What full files show otherwise than those that were sent: ``dives`` that both have, root mean square of
+    the difference of ``speed`` and of a component of the ``current`` (m/s, None: no dive has both), and how
+    much later (h) each incident of the full files was opened by those sent (None: never)."""
+
+    dives: int
+    speed: float | None
+    current: float | None
+    delays: tuple[tuple[str, float | None], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Hindcast:
+    """What came of a mission: by files as sent (``online``), by full ones (``full``), their ``difference``.
+
+    ``near_real_time`` and ``delayed`` are medians of the standard error of the instantaneous current (m/s).
+    """
+
+    name: str
+    glider: str
+    estimator: str
+    online: Judged | None
+    full: Judged | None
+    difference: Difference | None
+    near_real_time: float | None
+    delayed: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What a report draws: assessments by each kind of files, the currents in delayed mode, the dives' own,
+    and the places (degrees, (n, 2)) of the basis functions of the papers' law."""
+
+    online: tuple[Assessment, ...]
+    full: tuple[Assessment, ...]
+    delayed: Delayed | None
+    measured: tuple[MeanCurrent, ...]
+    centres: Array
+    sigma: float
+
+    @property
+    def best(self) -> tuple[Assessment, ...]:
+        """By full files where they are there, else as sent."""
+        return self.full or self.online
+
+
+def hindcast(mission: Mission, out: Path, estimator: str = "joint") -> tuple[Hindcast, Evidence]:
+    """Judge a mission again, leaving the results of each replay in `out`.
+
+    `estimator` is `joint`, `adaptive`, or `adaptive:PRESET`. Raises GliderwatchError where nothing can be
+    judged.
+    """
+    assessed: dict[str, tuple[Assessment, ...]] = {"online": (), "full": ()}
+    judged = dict[str, Judged]()
+    measured, centres, sigma = list[MeanCurrent](), readonly(np.empty((0, 2))), 0.0
+    config = configured(mission.glider, _settings(estimator))
+    with local(mission.place) as folder:
+        caches = tuple(sorted({path.parent for path in folder.rglob("*") if is_cache(path.name)}))
+        files = find_files([folder])
+        for kind, wanted in (("online", False), ("full", True)):
+            chosen = tuple(path for path in files if is_full(path) is wanted)
+            if not chosen:
+                continue
+            request = Request(chosen, (*caches, *_beside(folder)), config, mission.glider, out / kind)
+            store = replay(request).store
+            assessed[kind] = tuple(store.assessments(mission.glider))
+            judged[kind] = judge(assessed[kind], store.incidents(mission.glider))
+            measured = mean_currents(_dives(store, mission.glider)) or measured
+            newest, _ = store.segments.resume(SegmentId(float("inf"), mission.glider, ""))
+            centres = newest.memory.estimate.learner.centres
+            store.close()
+    if not any(assessed.values()):
+        raise GliderwatchError(
+            f"{mission.place}: no dive of {mission.glider} could be judged: see why by "
+            f"gliderwatch run --replay {mission.place}"
+        )
+    sigma = config.glider(mission.glider).learner.sigma
+    delayed = smooth(measured, FlowParams()) if len(measured) > 1 else None
+    both = "online" in judged and "full" in judged
+    found = Hindcast(
+        mission.name,
+        mission.glider,
+        estimator,
+        judged.get("online"),
+        judged.get("full"),
+        _difference(assessed, judged) if both else None,
+        None if delayed is None else float(np.median(delayed.near_real_time.sigma)),
+        None if delayed is None else float(np.median(delayed.delayed.sigma)),
+    )
+    evidence = Evidence(assessed["online"], assessed["full"], delayed, tuple(measured), centres, sigma)
+    return found, evidence
+
+
+def _settings(estimator: str) -> dict[str, str]:
+    algorithm, _, preset = check(estimator).partition(":")
+    return {"estimator": algorithm} | ({"preset": preset} if preset else {})
+
+
+def _beside(folder: Path) -> tuple[Path, ...]:
+    """Folders of caches that lie beside a mission's."""
+    return tuple(path for path in folder.resolve().parent.glob("[cC][aA][cC][hH][eE]") if path.is_dir())
+
+
+def judge(dives: Sequence[Assessment], incidents: Iterable[Incident]) -> Judged:
+    """The dives of a mission, counted."""
+    flags = Counter("none" if dive.flag is None else str(dive.flag) for dive in dives)
+    speeds = [dive.speed for dive in dives if dive.speed is not None]
+    flows = [np.hypot(d.flow_u, d.flow_v) for d in dives if d.flow_u is not None and d.flow_v is not None]
+    return Judged(
+        len(dives),
+        dict(sorted(flags.items())),
+        dives[0].t_dive if dives else 0.0,
+        dives[-1].t_surface if dives else 0.0,
+        float(np.median(speeds)) if speeds else None,
+        float(np.median(flows)) if flows else None,
+        tuple(Found(i.kind.value, i.since, i.opened_at, i.cleared_at) for i in incidents),
+    )
+
+
+def _difference(assessed: dict[str, tuple[Assessment, ...]], judged: dict[str, Judged]) -> Difference:
+    pairs = same_dives(assessed["full"], assessed["online"])
+    speed = [a.speed - b.speed for a, b in pairs if a.speed is not None and b.speed is not None]
+    current = [
+        x - y
+        for a, b in pairs
+        for x, y in ((a.flow_u, b.flow_u), (a.flow_v, b.flow_v))
+        if x is not None and y is not None
+    ]
+    return Difference(
+        len(pairs), _rms(speed), _rms(current), delays(judged["full"].incidents, judged["online"].incidents)
+    )
+
+
+def same_dives(
+    some: Sequence[Assessment], others: Sequence[Assessment]
+) -> list[tuple[Assessment, Assessment]]:
+    """The dives that are in both, each with itself."""
+    starts = np.array([dive.t_dive for dive in others])
+    out = []
+    for dive in some:
+        if (
+            len(starts)
+            and abs(starts[i := int(np.argmin(np.abs(starts - dive.t_dive)))] - dive.t_dive) < SAME
+        ):
+            out.append((dive, others[i]))
+    return out
+
+
+def delays(full: Sequence[Found], online: Sequence[Found]) -> tuple[tuple[str, float | None], ...]:
+    """Of each incident by full files its kind, and how much later (h) files as sent opened one of that kind
+    which lasted at the same time; None: they did not."""
+
+    def later(one: Found) -> float | None:
+        end = np.inf if one.cleared_at is None else one.cleared_at
+        same = [o for o in online if o.kind == one.kind and o.since <= end and _end(o) >= one.since]
+        return min((o.opened_at - one.opened_at) / 3600 for o in same) if same else None
+
+    return tuple((one.kind, later(one)) for one in full)
+
+
+def _end(one: Found) -> float:
+    return np.inf if one.cleared_at is None else one.cleared_at
+
+
+def _rms(values: Sequence[float]) -> float | None:
+    return float(np.sqrt(np.mean(np.square(values)))) if values else None
+
+
+def _dives(store: Store, glider: str) -> list[Dive]:
+    """The dives of a replay that ended, with what was measured on them."""
+    state, dives = Navigation(), dict[float, Dive]()
+    for identity in store.segments.of(glider):
+        state, found = extend(state, store.segments.get(identity))
+        dives |= {dive.t_dive: dive for dive in found}
+    return [dives[t] for t in sorted(dives) if dives[t].end is not None]
+
+
+def mean_currents(dives: Iterable[Dive]) -> list[MeanCurrent]:
+    """The depth-averaged currents of dives, with the angle of attack in the reckoning.
+
+    On board the way through the water is reckoned from depth rate and pitch, so that the part that the angle
+    of attack takes (`slip` of an observation) is left in the current: it is given back, half of it being its
+    error (002, "delayed mode").
+    """
+    out = list[MeanCurrent]()
+    for dive in dives:
+        if dive.track is None or dive.current is None or dive.end is None:
+            continue
+        seen = observe(dive)
+        rest = seen.rest
+        if rest is None or seen.current is None or (out and seen.start < out[-1].end):
+            continue
+        lost = seen.slip * rest
+        sigma = float(np.hypot(seen.current_sigma, 0.5 * np.hypot(*lost)))
+        out.append(MeanCurrent(seen.start, seen.end, readonly(seen.current + lost), sigma, dive.end.lat))
+    return out
+
+
+def fingerprint(mission: Mission, estimator: str) -> str:
+    """A short hash of all that a hindcast rests on: files with their sizes, the estimator, the version."""
+    with local(mission.place) as folder:
+        listed = [f"{path.name} {path.stat().st_size}" for path in find_files([folder])]
+    parts = [__version__, repr(mission), estimator, *sorted(listed)]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
+
+
+def read(path: Path) -> Hindcast | None:
+    """A result that an earlier run left; None where there is none that can be read."""
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=Hindcast)
+    except (OSError, msgspec.DecodeError):
+        return None

@@ -1,0 +1,142 @@
+"""The report of a hindcast: a page, the same on paper, and the numbers of its figures."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import msgspec
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from gliderwatch import __version__
+from gliderwatch.archive import drawing, hindcast
+from gliderwatch.archive.hindcast import Evidence, Hindcast, Judged
+from gliderwatch.archive.missions import Mission
+from gliderwatch.errors import GliderwatchError
+from gliderwatch.export import netcdf
+from gliderwatch.figures import panel_svg, plots
+from gliderwatch.messages.formatting import INCIDENTS, utc
+from gliderwatch.model import Kind
+
+RESULT, PAGE, PAPER, NUMBERS = "hindcast.json", "report.html", "report.pdf", "figures.nc"
+
+
+def make_in(root: Path, estimator: str, mission: Mission) -> Hindcast:
+    """The work on one mission, its report in a folder of its own below `root`."""
+    return make(mission, root / mission.name, estimator)
+
+
+def make(mission: Mission, out: Path, estimator: str) -> Hindcast:
+    """Judge a mission again and write its report into `out`, or read what an earlier run wrote of the same.
+
+    Raises GliderwatchError where nothing can be judged, or a file cannot be written.
+    """
+    key = hindcast.fingerprint(mission, estimator)
+    done, result = out / f"done-{key}", hindcast.read(out / RESULT)
+    if done.exists() and result is not None:
+        return result
+    found, evidence = hindcast.hindcast(mission, out, estimator)
+    try:
+        write(out, found, evidence)
+        for old in out.glob("done-*"):
+            old.unlink()
+        done.touch()
+    except OSError as error:
+        raise GliderwatchError(f"{out} cannot be written: {error.strerror}") from None
+    return found
+
+
+def write(out: Path, found: Hindcast, evidence: Evidence) -> None:
+    """Write page, paper, numbers and the result itself."""
+    made = drawing.panels(evidence)
+    track = drawing.track_figure(evidence)
+    pictures = [
+        (
+            drawing.TRACK,
+            "Where it surfaced, and where speed and flow as estimated would have led it.",
+            Markup(plots.as_svg(track)),
+        ),
+        *((panel.name, panel.shows, Markup(panel_svg.svg(panel))) for panel in made),
+    ]
+    page = (
+        _environment()
+        .get_template("report.html")
+        .render(
+            found=found,
+            kinds=_kinds(found),
+            pictures=pictures,
+            style=Markup(panel_svg.STYLE),
+            version=__version__,
+        )
+    )
+    (out / PAGE).write_text(page, encoding="utf-8")
+    paper = [_cover(found), track, *(plots.page_figure(panel) for panel in made)]
+    plots.write_pdf(out / PAPER, f"{found.name}: hindcast", paper)
+    drawing.write_numbers(out / NUMBERS, evidence, made)
+    placed = [d for d in evidence.best if d.lat is not None]
+    if placed:
+        netcdf.write(out / "dives.nc", found.glider, evidence.best, placed[-1].t_surface)
+    partial = out / f"{RESULT}.part"
+    partial.write_bytes(msgspec.json.format(msgspec.json.encode(found), indent=2))
+    partial.replace(out / RESULT)
+
+
+def _kinds(found: Hindcast) -> list[tuple[str, Judged]]:
+    both = (("as sent", found.online), ("full files", found.full))
+    return [(words, judged) for words, judged in both if judged is not None]
+
+
+def lines(found: Hindcast) -> list[str]:
+    """What was found, in lines for a page of paper or a terminal."""
+    out = [f"{found.glider}, estimator {found.estimator}"]
+    for words, judged in _kinds(found):
+        flags = ", ".join(f"{flag}: {n}" for flag, n in judged.flags.items())
+        out.append(f"{words}: {judged.dives} dives, {utc(judged.start)} to {utc(judged.end)}; flags {flags}")
+        for one in judged.incidents:
+            end = "still open at the end" if one.cleared_at is None else f"until {utc(one.cleared_at)}"
+            out.append(f"  {incident(one.kind)} since {utc(one.since)}, seen {utc(one.opened_at)}, {end}")
+    if found.difference is not None:
+        d = found.difference
+        out.append(
+            f"both kinds of files: {d.dives} dives, differ by {_cm(d.speed)} in speed, "
+            f"{_cm(d.current)} in a component of the current"
+        )
+        for kind, late in d.delays:
+            when = "not at all" if late is None else f"{late:+.1f} h later"
+            out.append(f"  {incident(kind)}: by files as sent {when}")
+    if found.delayed is not None:
+        out.append(
+            f"instantaneous current: standard error {_cm(found.near_real_time)} near real time, "
+            f"{_cm(found.delayed)} in delayed mode"
+        )
+    return out
+
+
+def incident(kind: str) -> str:
+    """The kind of an incident in words."""
+    return INCIDENTS.get(Kind(kind), kind)
+
+
+def _cm(value: float | None) -> str:
+    return "unknown" if value is None else f"{100 * value:.1f} cm/s"
+
+
+def _cover(found: Hindcast) -> object:
+    figure = plots.library().figure.Figure(figsize=(8.3, 5.8))
+    figure.text(0.06, 0.92, found.name, fontsize=16, fontweight="bold", va="top")
+    figure.text(0.06, 0.84, "\n".join(lines(found)), fontsize=7.5, va="top", family="monospace", wrap=True)
+    return figure
+
+
+@cache
+def _environment() -> Environment:
+    made = Environment(
+        loader=PackageLoader("gliderwatch.archive"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters |= {"utc": utc, "incident": incident, "cm": _cm}
+    return made

@@ -1,0 +1,139 @@
+"""Missions that are over, judged again: by files as sent and full ones, with a report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import fsspec
+import netCDF4
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from gliderwatch.archive import cluster, missions, report, summary
+from gliderwatch.archive.hindcast import Found, Hindcast, delays
+from gliderwatch.archive.missions import Mission
+from gliderwatch.errors import GliderwatchError
+from gliderwatch.simulate.delivery import write_full_rate, write_mission
+from gliderwatch.simulate.glider import simulate
+from gliderwatch.simulate.scenario import Fault, FaultKind, Scenario
+
+DAY = 86400.0
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a mission of two days with both kinds of files, slowed down after a day."""
+    folder = tmp_path_factory.mktemp("archive") / "sim-2024"
+    scenario = Scenario(seed=3, days=2.0, interval=2 * 3600.0, full_rate=True)
+    faults = (Fault(FaultKind.REMORA, scenario.start + 1.2 * DAY, 8.0, 0.0),)
+    mission = simulate(Scenario(seed=3, days=2.0, interval=2 * 3600.0, full_rate=True, faults=faults))
+    write_mission(folder / "sent", folder / "cache", mission)
+    write_full_rate(folder / "recovered", mission)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def made(place: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Mission, Hindcast]:
+    """Its report."""
+    (mission,) = missions.find([str(place)])
+    out = tmp_path_factory.mktemp("reports")
+    return out / mission.name, mission, report.make_in(out, "joint", mission)
+
+
+def test_both_kinds_of_files_are_judged_and_compared(made: tuple[Path, Mission, Hindcast]) -> None:
+    _, mission, found = made
+    assert (mission.name, mission.glider, mission.full, mission.online) == ("sim-2024", "sim", True, True)
+    assert found.online is not None
+    assert found.full is not None
+    assert found.difference is not None
+    assert found.difference.dives >= found.online.dives - 2 > 10
+    assert found.difference.speed is not None
+    assert found.difference.speed < 0.03
+    assert found.delayed is not None
+    assert found.near_real_time is not None
+    assert found.delayed <= found.near_real_time
+
+
+def test_the_report_is_a_page_a_paper_and_numbers(made: tuple[Path, Mission, Hindcast]) -> None:
+    out, _, found = made
+    page = (out / report.PAGE).read_text()
+    assert "Speed" in page
+    assert "Delayed mode, east" in page
+    assert "http" not in page.replace("http-equiv", "").replace("http://www.w3.org/", "")
+    assert (out / report.PAPER).read_bytes().startswith(b"%PDF")
+    with netCDF4.Dataset(out / report.NUMBERS) as data:
+        speed = data["speed"]
+        assert found.full is not None
+        assert len(speed["through_water"]) == found.full.dives
+        assert speed["through_water"].units == "m/s"
+        assert np.isfinite(data["delayed_mode_east"]["current"][:]).all()
+        assert len(data["track"]["surfacing_lat"]) > 10
+
+
+def test_what_is_done_is_not_done_again(made: tuple[Path, Mission, Hindcast], monkeypatch) -> None:
+    out, mission, found = made
+
+    def never(*_: object) -> None:
+        raise AssertionError("judged again")
+
+    monkeypatch.setattr(report.hindcast, "hindcast", never)
+    assert report.make(mission, out, "joint") == found
+    with pytest.raises(AssertionError, match="judged again"):
+        report.make(mission, out, "adaptive")
+
+
+def test_the_papers_law_shows_its_error_and_its_basis(place: Path, tmp_path: Path) -> None:
+    (mission,) = missions.find([str(place / "sent")])
+    found = report.make_in(tmp_path, "adaptive:franklin", Mission("x", str(place), "sim", False, True))
+    assert mission.full is False
+    assert found.estimator == "adaptive:franklin"
+    with netCDF4.Dataset(tmp_path / "x" / report.NUMBERS) as data:
+        assert len(data["clle"]["largest_of_the_dive"]) > 5
+        assert len(data["track"]["basis_function_lat"]) >= 1
+
+
+def test_an_archive_may_lie_in_an_object_store(place: Path) -> None:
+    store = fsspec.filesystem("memory")
+    store.put(f"{place}/sent/", "/archive/sim/", recursive=True)
+    store.put(f"{place}/cache/", "/archive/sim/cache/", recursive=True)
+    (mission,) = missions.find(["memory://archive/sim"])
+    assert (mission.glider, mission.online, mission.full) == ("sim", True, False)
+    with missions.local(mission.place) as folder:
+        assert len(list(folder.rglob("*.sbd"))) == len(list((place / "sent").rglob("*.sbd")))
+
+
+def test_folders_that_hold_no_mission_are_named(tmp_path: Path) -> None:
+    with pytest.raises(GliderwatchError, match="holds no flight data"):
+        missions.find([str(tmp_path)])
+    with pytest.raises(GliderwatchError, match="is not a folder"):
+        missions.find([str(tmp_path / "none")])
+    with pytest.raises(GliderwatchError, match="there is no estimator"):
+        report.make_in(tmp_path, "best", Mission("x", str(tmp_path), "sim", False, True))
+
+
+def test_a_scheduler_that_does_not_answer_is_named(monkeypatch) -> None:
+    monkeypatch.setattr(cluster, "PATIENCE", "0.2s")
+    with (
+        pytest.raises(GliderwatchError, match="no Dask scheduler answers"),
+        cluster.client("tcp://127.0.0.1:9"),
+    ):
+        pass
+
+
+def test_delays_are_of_the_same_incident() -> None:
+    full = [
+        Found("anomaly", 0.0, 3600.0, 9e4),
+        Found("anomaly", 2e5, 2.1e5, None),
+        Found("false_alarm", 0, 1, 2),
+    ]
+    online = [Found("anomaly", 3600.0, 10800.0, None)]
+    assert delays(full, online) == (("anomaly", 2.0), ("anomaly", -55.333333333333336), ("false_alarm", None))
+
+
+def test_the_summary_is_a_table_and_a_page(made: tuple[Path, Mission, Hindcast], tmp_path: Path) -> None:
+    summary.write(tmp_path, [made[2]])
+    table = pq.read_table(tmp_path / summary.TABLE).to_pylist()
+    assert [row["files"] for row in table] == ["as sent", "full"]
+    assert table[0]["dives"] == table[0]["judged"] + made[2].online.flags.get("none", 0)
+    assert "sim-2024/report.html" in (tmp_path / summary.PAGE).read_text()
