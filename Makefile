@@ -94,6 +94,7 @@ wheelhouse: $(VENV)/installed sbom ## everything a machine without internet need
 	cp -r requirements.lock config systemd docs README.md CONTRIBUTING.md CHANGELOG.md LICENSE $(WHEELHOUSE)
 	mkdir $(WHEELHOUSE)/benchmarks && cp benchmarks/*.md $(WHEELHOUSE)/benchmarks
 	cp dist/gliderwatch.cdx.json $(WHEELHOUSE)
+	$(BIN)/python docs/shell.py $(WHEELHOUSE)/share
 	tar -C dist -czf dist/gliderwatch-wheelhouse.tar.gz wheelhouse
 	@echo "dist/gliderwatch-wheelhouse.tar.gz: for $$($(BIN)/python -V) on $$(uname -m); see docs/install.md"
 
