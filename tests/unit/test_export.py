@@ -152,5 +152,11 @@ def test_virtual_aid_is_read_back():
     assert (found["lat"], found["lon"]) == pytest.approx((-61.25, 179.5), abs=2e-6)
     assert found["name"].strip() == "GLIDER UNIT 1033"
     assert found["to_bow"] == 340
-    with pytest.raises(GliderwatchError, match="begins with 99"):
-        ais.lines("x", DriftEllipse(0.0, 0.0, 1.0, 1.0, 0.0), 244123456, NOW)
+    area = DriftEllipse(24.25, -83.5, 5.0, 5.0, 0.0)
+    (line,) = ais.lines("unit_1033", area, 244123456, NOW)
+    found = decode(line).asdict()
+    assert (found["msg_type"], found["mmsi"], found["accuracy"]) == (1, 244123456, True)
+    assert (found["lat"], found["lon"]) == pytest.approx((24.25, -83.5), abs=2e-6)
+    assert (found["heading"], found["course"], found["speed"]) == (511, 360.0, 102.3)  # not known
+    with pytest.raises(GliderwatchError, match="nine digits"):
+        ais.lines("x", area, 99, NOW)

@@ -16,6 +16,7 @@ from gliderwatch.config.document import Document, Problem, nearest, read, shown
 from gliderwatch.config.fields import GliderName, Name, Section
 from gliderwatch.config.health import limits_of
 from gliderwatch.config.schema import (
+    Ais,
     Channel,
     Dockserver,
     FieldSetting,
@@ -67,6 +68,7 @@ class Config(Section):
     metrics: Metrics = Field(default=Metrics(), description="For Prometheus.")
     maps: Maps = Field(default=Maps(), description="Finer maps.")
     pages: Pages = Field(default=Pages(), description="Pages for pilots as files.")
+    ais: Ais = Field(default=Ais(), description="Virtual AIS.")
     web: Web = Field(default=Web(), description="The pages live.")
     _document: Document = PrivateAttr(Document(Path("configuration"), None, {}))
     _presets: Mapping[str, Preset] = PrivateAttr(default_factory=dict)

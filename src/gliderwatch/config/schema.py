@@ -219,6 +219,9 @@ class Settings(Preset):
         )
 
 
+Mmsi = Annotated[int, Field(strict=True, ge=200_000_000, le=999_999_999)]
+
+
 class Layers(Section):
     """Layers of the sea in what the glider measures, and how deep it is advised to fly to keep on them.
 
@@ -264,6 +267,11 @@ class Glider(Settings):
     paths: tuple[AbsolutePath, ...] = Field(
         default=(),
         description="From-glider folders that lie outside of the roots. Relative to this file.",
+    )
+    mmsi: Mmsi | None = Field(
+        default=None,
+        description="Its number for virtual AIS, as the authority gave it: one that begins with 99 makes "
+        "it a virtual aid to navigation (message 21), another a vessel (message 1); null: it has none.",
     )
     muted_until: Moment | None = Field(
         default=None,
@@ -487,6 +495,21 @@ class Pages(Section):
     folder: AbsolutePath | None = Field(
         default=None,
         description="The folder in which they are kept up to date; made if need be. null: none are written.",
+    )
+
+
+class Ais(Section):
+    """Virtual AIS of the gliders that have an `mmsi`: where each is now, also under water; off by default."""
+
+    file: AbsolutePath | None = Field(
+        default=None, description="File that holds the newest lines (NMEA 0183); null: none is written."
+    )
+    udp_port: Annotated[int, Field(strict=True, ge=1, le=65535)] | None = Field(
+        default=None,
+        description="UDP port of this machine to which they are sent, such as 10110; null: none.",
+    )
+    seconds: Annotated[Number, Field(ge=10, le=3600)] = Field(
+        default=180.0, description="Time between two of them (s); AIS has 180 for aids to navigation."
     )
 
 

@@ -1,4 +1,5 @@
-"""The place of a submerged glider as a virtual aid to navigation (AIS message 21), for charts on board. Pure.
+"""The place of a submerged glider as AIS, for charts on board: a virtual aid to navigation (message 21), or a
+vessel (message 1). Pure.
 
 002 proposes it: ships then see on their screen where a glider is that may come up. On the air it needs a
 licence and a number (MMSI 99MIDxxxx) of the authority; here it is made as text, and sent nowhere.
@@ -14,14 +15,17 @@ from gliderwatch.incidents.notices import DriftEllipse
 
 ACCURATE = 10.0
 """Metres below which ITU-R M.1371 calls a position accurate."""
+AIDS = 990_000_000
+"""The least number of an aid to navigation."""
 LARGEST = 511
 """Metres from the position to each side that a message can hold."""
 
 
 def lines(glider: str, area: DriftEllipse, mmsi: int, now: float) -> list[str]:
-    """NMEA 0183 lines (VDM) of where a glider is with 95 % at `now` (s).
+    """NMEA 0183 lines (VDM) of where a glider is with 95 % at `now` (s): message 21 of a number that begins
+    with 99, as aids to navigation have, else message 1.
 
-    Raises GliderwatchError where pyais is not installed, or the number is none of a virtual aid.
+    Raises GliderwatchError where pyais is not installed, or the number is none.
     """
     try:
         from pyais.encode import encode_dict  # noqa: PLC0415 (an extra)
@@ -29,26 +33,36 @@ def lines(glider: str, area: DriftEllipse, mmsi: int, now: float) -> list[str]:
         raise GliderwatchError(
             "virtual AIS needs pyais, which is not installed: docs/install.md says how"
         ) from None
-    if not 990_000_000 <= mmsi <= 999_999_999:
-        raise GliderwatchError(
-            f"{mmsi} is not the number of an aid to navigation: it has nine digits and begins with 99"
-        )
-    half = min(round(area.major), LARGEST)
-    fields: dict[str, str | int | float | bytes | bool] = {
-        "type": 21,
+    if not 200_000_000 <= mmsi <= 999_999_999:
+        raise GliderwatchError(f"{mmsi} is no number of AIS: it has nine digits and begins with 2 or more")
+    fields = {
         "mmsi": mmsi,
-        "aid_type": 1,  # reference point
-        "name": re.sub(r"[^A-Z0-9 ]", " ", f"GLIDER {glider.upper()}")[:20],
         "accuracy": int(area.major < ACCURATE),
         "lon": area.lon,
         "lat": area.lat,
+        "second": datetime.fromtimestamp(now, UTC).second,
+        **(_aid(glider, area) if mmsi >= AIDS else _VESSEL),
+    }
+    return list(encode_dict(fields, talker_id="AI", sentence_type="VDM", radio_channel="A"))
+
+
+_Fields = dict[str, str | int | float | bytes | bool]
+_VESSEL: _Fields = {"type": 1, "status": 15, "turn": -128, "speed": 102.3, "course": 360.0, "heading": 511}
+"""Of all that a vessel says beside its place, that it is not known."""
+
+
+def _aid(glider: str, area: DriftEllipse) -> _Fields:
+    """A virtual aid to navigation, as large as the ellipse."""
+    half = min(round(area.major), LARGEST)
+    return {
+        "type": 21,
+        "aid_type": 1,  # reference point
+        "name": re.sub(r"[^A-Z0-9 ]", " ", f"GLIDER {glider.upper()}")[:20],
         "to_bow": half,
         "to_stern": half,
         "to_port": min(half, 63),
         "to_starboard": min(half, 63),
         "epfd": 0,
-        "second": datetime.fromtimestamp(now, UTC).second,
         "off_position": 0,
         "virtual_aid": 1,
     }
-    return list(encode_dict(fields, talker_id="AI", sentence_type="VDM", radio_channel="A"))

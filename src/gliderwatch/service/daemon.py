@@ -25,6 +25,7 @@ from gliderwatch.service.page_writer import PagesWritten, PageWriter
 from gliderwatch.service.routing import Routing
 from gliderwatch.service.runtime import Decoded, News, Runtime, build
 from gliderwatch.service.state_outage import StateOutage
+from gliderwatch.service.virtual_ais import VirtualAis
 from gliderwatch.slocum.watch import CacheChanged, EventsLost, FileChanged, ScienceChanged
 from gliderwatch.store.state_file import Status, Store
 
@@ -156,6 +157,7 @@ class Daemon:
         self._wake = threading.Event()
         self._stopping = False
         self._pages = PageWriter(self._news.put)
+        self._ais = VirtualAis(self._store)
         self._intake = Intake(self._store, self._upkeep, self._wake, self._is_stopping, self._pages.changed)
         self._use(build(config, self._news, self._wake, workers))
 
@@ -165,6 +167,7 @@ class Daemon:
         self._intake.use(runtime)
         self._upkeep.use(runtime.config)
         self._pages.use(runtime.config)
+        self._ais.use(runtime.config)
         self._caught_up = self._retry = False
         self._returned_in: float | None = None
         self._next_scan = self._next_beat = time.monotonic()
@@ -227,6 +230,7 @@ class Daemon:
             self._retention.turn(self._runtime.config.state.keep_days, time.time(), time.monotonic())
         if self._caught_up:
             self._pages.turn(self._store.gliders(), time.monotonic())
+            self._ais.turn(time.time(), time.monotonic())
         if time.monotonic() >= self._next_beat:
             self._beat()
 

@@ -85,11 +85,11 @@ def _place(config: Config) -> Iterator[Refusal]:
 
 
 def _pages(config: Config) -> Iterator[Refusal]:
-    """The pages do not lie on the dockserver."""
-    if config.pages.folder is not None:
+    """The pages do not lie on the dockserver, nor does the file of virtual AIS."""
+    for key, place in (("pages.folder", config.pages.folder), ("ais.file", config.ais.file)):
         for root in expand(config.dockserver.roots):
-            if Path(config.pages.folder).is_relative_to(root):
-                yield Refusal("pages.folder", f"lies below the root {root}", "put it elsewhere")
+            if place is not None and Path(place).is_relative_to(root):
+                yield Refusal(key, f"lies below the root {root}", "put it elsewhere")
 
 
 def _is_closed(path: Path) -> bool:
