@@ -1,10 +1,11 @@
 """How soon simulated faults of health are reported, how often, and what healthy gliders are told.
 
-    python benchmarks/health.py [--seeds 10] [--months 10]
+    python benchmarks/health.py [--seeds 10] [--months 10] [--data ../shared/data]
 
 Each fault begins on a glider of its own for each seed, with dropped calls, calls without a file, garbled
 lines and pilots who type. Its files and logs go through a replay. Counted are the messages about it, and the
-surfacings from its onset to the first of them. Healthy gliders fly for 30 days each.
+surfacings from its onset to the first of them. Healthy gliders fly for 30 days each. Of the real missions of
+`--data` it is listed which rules had anything to look at, and what they found.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from statistics import median
 from typing import NamedTuple
 
 from gliderwatch.config import load
+from gliderwatch.health.rules import RULES
 from gliderwatch.model import Alert, Kind
 from gliderwatch.service.replay import Request, replay
 from gliderwatch.simulate.ailments import Ailment, AilmentKind
@@ -129,12 +131,28 @@ def healthy(months: int) -> None:
         print(f"healthy, {month} months: {len(told)} messages {told}", flush=True)
 
 
+def real(data: Path) -> None:
+    """Print which rules could look at something on real missions, and the messages of health."""
+    for folder in sorted(path for path in data.iterdir() if path.is_dir()):
+        store = replay(Request((folder,), (folder / "cache",))).store
+        looked = {
+            rule for glider in store.gliders() for _, judged in store.health.judged(glider) for rule in judged
+        }
+        found = [alert.title for alert in store.alerts() if alert.kind is Kind.HEALTH]
+        store.close()
+        print(f"{folder.name}: {len(looked)} of {len(RULES)} rules could look, {len(found)} messages {found}")
+        print(f"    {', '.join(rule.name for rule in RULES if rule.name in looked)}", flush=True)
+
+
 def main() -> None:
     shape = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=shape)
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--months", type=int, default=10)
+    parser.add_argument("--data", type=Path)
     given = parser.parse_args()
+    if given.data is not None:
+        real(given.data)
     for name, fault in FAULTS.items():
         faults(name, fault, given.seeds)
     healthy(given.months)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pytest
 
+from gliderwatch.config.health import Health, limits_of
 from gliderwatch.health.battery import battery_end, without_resets
 from gliderwatch.health.leaks import trend
 from gliderwatch.health.readings import History, of_call, of_segment, recent
@@ -211,6 +212,23 @@ class TestBatteryEnd:
         amount = np.linspace(0, 300 * 3600, 49)
         assert self.of(amount.tolist(), "charge_used", capacity=500 * 3600.0) is not None  # 3 days
         assert self.of(amount.tolist(), "charge_used") is None
+
+    def test_volts_tell_the_end_of_alkaline_cells_alone(self) -> None:
+        """From 15 V by 0.2 V a day, eight days: 12 days are left to 11 V."""
+        rng = np.random.default_rng(3)
+        volts = 15.0 - 0.2 * np.arange(64) / 8 + 0.03 * rng.standard_normal(64)
+        h = history(
+            {"battery_voltage": volts[:-1].tolist()}, {"battery_voltage": volts[-1:].tolist()}, DAY / 8
+        )
+        for chemistry in ("alkaline", "lithium", "rechargeable", None):
+            limits = limits_of(Health(), None, chemistry)["battery_end"]
+            end = battery_end(h, limits)
+            assert (end is not None) is (chemistry == "alkaline")
+            if end is not None:
+                assert end.earliest < 12.1 * DAY < end.latest
+                assert end.left == pytest.approx(12.1 * DAY, rel=0.1)
+        given = Health.model_validate({"battery_end": {"volts": 13.0}})
+        assert limits_of(given, None, "alkaline")["battery_end"]["volts"] == 13.0
 
     def test_day_with_thruster_is_no_month(self) -> None:
         use = np.array([0.02] * 56 + [0.16] * 8) / 8  # the last day with the thruster

@@ -143,6 +143,12 @@ ABORT HISTORY: last abort mission: EW33.MI
         ("I will call you back in 2 minutes", [logs.HangUp(2.0)]),
         ("!!HARDWARE IN EMERGENCY MODE!!", [logs.Emergency()]),
         ("12 DRIVER_WARNING:gps:no fix", [logs.Trouble("warning", "12 DRIVER_WARNING:gps:no fix")]),
+        ("12 DRIVER_ERROR:fin:stuck", [logs.Trouble("error", "12 DRIVER_ERROR:fin:stuck")]),
+        ("12 DRIVER_ODDITY:gps:late", [logs.Trouble("oddity", "12 DRIVER_ODDITY:gps:late")]),
+        ("Because:no comms for a while", [logs.Because("no comms for a while")]),
+        ("Because:pitch not commanded [behavior]", [logs.Because("pitch not commanded")]),
+        ("^R", []),
+        ("^W", []),
         (
             ":OOD:digifin_mgr_ctrl:OUT OF DEADBAND: M_FIN:0.0579 C_FIN:0.0000",
             [logs.Trouble("deadband", ":OOD:digifin_mgr_ctrl:OUT OF DEADBAND: M_FIN:0.0579 C_FIN:0.0000")],

@@ -8,6 +8,8 @@ from pydantic import ConfigDict, Field, create_model, model_validator
 
 from gliderwatch.config.fields import Number, Section, Switch
 from gliderwatch.health import rules
+from gliderwatch.health.battery import END
+from gliderwatch.health.constants import ENDS_AT
 from gliderwatch.health.rule import Limit, Limits, Rule
 
 
@@ -61,8 +63,11 @@ else:
     )
 
 
-def limits_of(health: Health, recovery: float | None) -> dict[str, Limits]:
-    """The limits (SI) of the rules that are not off; ``recovery`` is planned then (s)."""
+def limits_of(health: Health, recovery: float | None, battery: str | None = None) -> dict[str, Limits]:
+    """The limits (SI) of the rules that are not off; ``recovery`` is planned then (s).
+
+    The chemistry of the ``battery`` says whether volts tell its end, unless `battery_end.volts` does.
+    """
     limits = rules.usual_limits(recovery)
     for rule in rules.RULES:
         section = getattr(health, rule.name)
@@ -74,4 +79,7 @@ def limits_of(health: Health, recovery: float | None) -> dict[str, Limits]:
             **limits[rule.name],
             **{name: None if value is None else value * si for name, (value, si) in given.items()},
         }
+    end = limits.get(END.name)
+    if end is not None and end["volts"] is None and battery is not None:
+        limits[END.name] = {**end, "volts": ENDS_AT.get(battery)}
     return limits

@@ -92,7 +92,8 @@ class Config(Section):
 
     def health(self, name: str) -> Mapping[str, Limits]:
         """The limits of the rules of health of a glider, but for rules that are off."""
-        return limits_of(self._of(name).health, self.gliders.get(name.lower(), Glider()).recovery)
+        settings, glider = self._of(name), self.gliders.get(name.lower(), Glider())
+        return limits_of(settings.health, glider.recovery, settings.battery)
 
     def locate(self, key: str) -> int:
         """The line of a dotted key (`channels.mail.url`, `dockserver.roots.0`) in the file."""

@@ -197,6 +197,12 @@ class Settings(Preset):
 
     preset: str | None = Field(default=None, description="Name of a preset; keys given here win over it.")
     rules: Rules = Field(default=Rules(), description="When to alert.")
+    battery: Literal["alkaline", "lithium", "rechargeable"] | None = Field(
+        default=None,
+        description="Its chemistry: the voltage of `alkaline` cells falls steadily, so it tells the end "
+        "where no charge and no coulombs do. That of `lithium` (primary) and `rechargeable` cells stays flat "
+        "almost to the end and tells nothing of it.",
+    )
     health: Health = Field(default=Health(), description="Rules of health.")
 
     def params(self) -> GliderParams:

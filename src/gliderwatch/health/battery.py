@@ -209,7 +209,9 @@ END = Rule(
         Limit("critical_days", 7, "days", 0, 1000, "Less left is critical.", DAY),
         Limit("reserve", 10, "%", 0, 100, "The battery ends at this part of its charge.", 0.01),
         Limit("capacity", None, "Ah", 1, 10000, "Of a full battery; null: coulombs are not used.", FULL),
-        Limit("volts", None, "V", 0, 60, "Voltage at its end (alkaline); null: volts are not used."),
+        Limit(
+            "volts", None, "V", 0, 60, "Voltage at its end; null: as `battery` says, 11 where it is alkaline."
+        ),
     ),
     "When the battery ends, by the use of the last days; held against the planned `recovery`.",
 )
