@@ -77,8 +77,8 @@ THRUSTER = 0.05
 """Part of the time from which on a block counts as flown with the thruster."""
 CONFIDENCE = 0.975
 ENDS_AT = {"alkaline": 11.0}
-"""Volts at which a battery ends, by its chemistry: ten alkaline cells fall from 1.5 V to 1.1 V each, and below
-the rest goes quickly (gliders abort at 10 V). Lithium cells are flat until the last days."""
+"""Volts at which a battery ends, by its chemistry: ten alkaline cells fall from 1.5 V to 1.1 V each, and
+below the rest goes quickly (gliders abort at 10 V). Lithium cells are flat until the last days."""
 FULL = 3600.0
 """Coulombs in an ampere hour."""
 
