@@ -8,6 +8,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cache
 from pathlib import Path
 
@@ -49,6 +50,14 @@ AS_IT_IS = {
 _MANY = 1000
 """Files at hand: more than those whose checkpoints are kept."""
 _NOT_MESSAGES = {Kind.SURFACING, Kind.OPERATOR}
+
+
+class Manner(StrEnum):
+    """How a glider is run: as a daemon would, without checkpoints on disk, or without messages."""
+
+    WHOLE = "whole"
+    DIRECT = "direct"
+    BARE = "bare"
 
 
 @dataclass(frozen=True)
@@ -123,10 +132,7 @@ def flight(job: Job) -> Flight:
     except (OSError, GliderwatchError):
         pass
     made = _flown(wanted)
-    job.kept.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(f".{os.getpid()}.part")
-    partial.write_bytes(packed(made))
-    partial.replace(path)
+    _keep(path, packed(made))
     return made
 
 
@@ -156,6 +162,36 @@ def _flown(wanted: Scenario) -> Flight:
                 break
     truth = tuple(dive for dive in mission.truth if dive.t_surface <= on_shore[-1])
     return Flight(tuple(segments), tuple(on_shore), truth)
+
+
+def result(job: Job, manner: Manner) -> Result:
+    """What comes of a job: as it was kept by an earlier run of this very program, else run now and kept."""
+    key = hashlib.sha256(f"{_program()}\n{job.days}\n{manner}\n{AFTER}".encode()).hexdigest()[:16]
+    path = job.kept / "results" / f"{job.name}-{key}.result"
+    try:
+        return msgspec.msgpack.decode(path.read_bytes(), type=Result)
+    except (OSError, msgspec.MsgspecError):
+        pass
+    made = run_bare(job) if manner is Manner.BARE else run(job, direct=manner is Manner.DIRECT)
+    _keep(path, msgspec.msgpack.encode(made))
+    return made
+
+
+def _keep(path: Path, data: bytes) -> None:
+    """Write a file that is there whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix(f".{os.getpid()}.part")
+    partial.write_bytes(data)
+    partial.replace(path)
+
+
+@cache
+def _program() -> str:
+    """A hash of all of gliderwatch and of this module."""
+    root, digest = Path(gliderwatch.__file__).parent, hashlib.sha256(Path(__file__).read_bytes())
+    for path in sorted(root.rglob("*.py")):
+        digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()
 
 
 def run(job: Job, *, direct: bool = False) -> Result:

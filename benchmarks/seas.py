@@ -3,8 +3,9 @@
 python benchmarks/seas.py --quick [--workers 2] [--seas mixed rotary] [--json out.json]
 
 For each kind of sea and each seed a healthy glider of 30 days, and faults that begin on day 6 and are
-followed for 15 days. Missions are simulated once, written as files, read again and kept in `build/seas`; so a
-run after a change of the estimator assesses them anew and does nothing else.
+followed for 15 days. Missions are simulated once, written as files, read again and kept in `build/seas`; so
+a run after a change of the estimator assesses them anew and does nothing else. Results are kept as well,
+each as it comes: a run that was stopped goes on where it was, as long as the program is the same.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from pathlib import Path
 from statistics import mean, median
 
 from common import machine
-from sea_runs import AS_IT_IS, FAULTS, SETTLED, Job, Message, Result, as_json, run, run_bare
+from sea_runs import AS_IT_IS, FAULTS, SETTLED, Job, Manner, Message, Result, as_json, result
 
 from gliderwatch.model import Kind
 from gliderwatch.score.measures import HEALTHY, DiveResult
@@ -219,13 +220,15 @@ def told(results: Iterable[Result]) -> Iterator[str]:
 
 def jobs(arguments: argparse.Namespace) -> list[Job]:
     """All gliders of a run: of the quick one a fault befalls one seed, in turn."""
-    seeds, first, found = arguments.seeds or (2 if arguments.quick else 6), arguments.first, []
-    for i, sea in enumerate(arguments.seas or SEAS):
-        for seed in range(seeds):
-            found.append(Job(sea, first + seed, HEALTHY, arguments.days, arguments.kept))
-        for j, fault in enumerate(FAULTS):
-            befallen = [(i + j) % seeds] if arguments.quick else range(seeds)
-            found += [Job(sea, first + seed, fault, arguments.days, arguments.kept) for seed in befallen]
+    seeds, first = arguments.seeds or (2 if arguments.quick else 6), arguments.first
+    seas = arguments.seas or list(SEAS)
+    found = [
+        Job(sea, first + seed, fault, arguments.days, arguments.kept)
+        for seed in range(seeds)  # seeds outside: a part of a run has all seas in it
+        for i, sea in enumerate(seas)
+        for j, fault in enumerate((HEALTHY, *FAULTS))
+        if fault == HEALTHY or not arguments.quick or (i + j - 1) % seeds == seed
+    ]
     wanted = arguments.only
     return [job for job in found if wanted is None or job.fault in wanted]
 
@@ -250,9 +253,9 @@ def main() -> None:
     results = list[Result]()
     with ProcessPoolExecutor(max_workers=arguments.workers, mp_context=context) as pool:
         try:
-            work = run_bare if arguments.bare else partial(run, direct=arguments.direct)
-            for result in pool.map(work, jobs(arguments)):
-                results.append(result)
+            manner = Manner.BARE if arguments.bare else Manner.DIRECT if arguments.direct else Manner.WHOLE
+            for found in pool.map(partial(result, manner=manner), jobs(arguments)):
+                results.append(found)
                 print(f"\r{len(results)} gliders", end="", file=sys.stderr, flush=True)
         except KeyboardInterrupt:  # what is done is worth its table
             pool.shutdown(wait=False, cancel_futures=True)
