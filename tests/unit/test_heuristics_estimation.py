@@ -230,6 +230,7 @@ class TestNoise:
 class TestModes:
     def test_how_often_and_how_large(self):
         table = {mode.cause: (mode.chance, mode.size) for mode in (*MODES, modes.ROLLED)}
+        assert [mode.loss for mode in (*MODES, modes.ROLLED)] == [0.0] * 5 + [0.36]
         assert sum(mode.chance for mode in MODES) == pytest.approx(1.0)
         assert table == {
             Cause.USUAL: (pytest.approx(0.92), 0.0),
@@ -237,7 +238,7 @@ class TestModes:
             Cause.FLOW: (0.03, 0.25),
             Cause.CURRENT: (0.02, 0.4),
             Cause.GROUND: (0.01, 0.3),
-            Cause.WING: (9.0, 0.45),
+            Cause.WING: (9.0, 0.27),
         }
 
     def test_what_was_wrong_is_wrong_again_six_times_of_ten(self):
@@ -501,12 +502,12 @@ class TestOpened:
         (wrong,) = (way for way in self.explained() if way.cause is Cause.CURRENT)
         assert wrong.noise[2:, 2:].diagonal().tolist() == [100.0, 100.0]
 
-    def test_a_wing_opens_slip_and_a_third_of_it_side(self):
+    def test_a_wing_opens_slip_and_half_of_it_side(self):
         state = kalman.init(JointParams(), 0.0)
         (wing,) = (way for way in self.explained() if way.cause is Cause.WING)
         steps_of_flow = kalman._jump(JointParams().flow)
         opened = kalman._cov(state, wing, steps_of_flow) - state.cov
-        assert np.sqrt(opened[[SLIP, SIDE], [SLIP, SIDE]]) == pytest.approx([0.45, 0.15])
+        assert np.sqrt(opened[[SLIP, SIDE], [SLIP, SIDE]]) == pytest.approx([0.27, 0.15])
 
 
 class TestAlgorithmOfThePaper:

@@ -3,7 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from gliderwatch.estimation.constants import WINDOW
+from gliderwatch.estimation import step_test
+from gliderwatch.estimation.constants import OLDER_EVERY, OLDER_KEPT, WINDOW
 from gliderwatch.estimation.step_test import (
     Bank,
     Update,
@@ -48,8 +49,8 @@ def misfit(updates):
 
 def banked(updates, precision):
     bank = Bank()
-    for update in updates:
-        bank = advance(bank, SHAPE, precision, np.diag(KEPT), update)
+    for dives, update in enumerate(updates):
+        bank = advance(bank, SHAPE, precision, np.diag(KEPT), update, dives)
     return bank
 
 
@@ -84,8 +85,10 @@ def test_likeliest_finds_dive_and_size_of_a_step():
             truth[1] += 2.0
         z.append(rows(k) @ truth + rng.multivariate_normal([0.0, 0.0], NOISE))
     x, updates = filtered(z)
-    found = likeliest(banked(updates, np.eye(2) * 0.1), 0)
-    assert found.dives in (6, 7, 8)  # 7: just before the tenth of sixteen
+    bank = banked(updates, np.eye(2) * 0.1)
+    found = likeliest(bank, 0)
+    (at,) = np.flatnonzero((bank.score == found.score).all(axis=1))
+    assert at in (8, 9, 10)  # just before the tenth of sixteen
     assert found.size == pytest.approx(2.0, abs=3 * found.sigma)
     assert found.ratio > 50
     # the filter has found part of it by itself: the shift is what is left
@@ -93,10 +96,23 @@ def test_likeliest_finds_dive_and_size_of_a_step():
     assert likeliest(banked(updates, np.eye(2) * 0.1), 0, sign=-1).ratio < 20
 
 
-def test_bank_forgets_old_dives(z):
-    bank = banked(filtered(np.tile(z, (3, 1)))[1], np.eye(2))
-    assert len(bank.score) == WINDOW
+def test_bank_holds_each_recent_dive_and_some_older_ones(z):
+    updates = filtered(np.tile(z, (20, 1)))[1]
+    assert len(banked(updates[:WINDOW], np.eye(2)).score) == WINDOW
+    # of the dives before the window one in `OLDER_EVERY` is held: here the one that left it at dive 24
+    assert len(banked(updates[: WINDOW + OLDER_EVERY - 1], np.eye(2)).score) == WINDOW + 1
+    assert len(banked(updates, np.eye(2)).score) == WINDOW + OLDER_KEPT
     assert likeliest(Bank(), 0) is None
+
+
+def test_an_older_hypothesis_has_seen_all_dives_since(z, monkeypatch):
+    updates = filtered(np.tile(z, (5, 1)))[1]
+    found = banked(updates, np.eye(2))
+    monkeypatch.setattr(step_test, "WINDOW", 100)
+    every = banked(updates, np.eye(2))
+    held = [0, 12, 24, *range(36, 60)]
+    assert found.score == pytest.approx(every.score[held], abs=1e-9)
+    assert found.shift == pytest.approx(every.shift[held], abs=1e-9)
 
 
 def test_free_numbers_take_what_they_can():

@@ -143,14 +143,22 @@ GROUND_ERROR = 0.3
 WING_ODDS = 9.0
 """For a wing that was lost or bent, where the glider has just begun to roll otherwise, which little else
 does: nine to one."""
-WING_SLIP = 0.45
-"""Usual slip that it makes, as part of W,"""
+WING_SLIP = 0.36
+"""Usual slip that it makes, as part of W: the mean of half a normal distribution of 0.45, as no lost wing
+makes a glider faster,"""
+WING_SPREAD = 0.27
+"""with the standard deviation of that,"""
 WING_SIDE = 0.15
 """rad: and usual side."""
 
 # Steps that the glider does not know of, and slow drifts
 WINDOW = 24
-"""Dives that a step may lie back, some three days: by then the flow has forgotten what it was before."""
+"""Dives before each of which a step is looked for, some three days,"""
+OLDER_EVERY = 12
+"""and then before one in so many: where a glider flies on one leg for days, a step that it does not know of
+is seen when it turns,"""
+OLDER_KEPT = 8
+"""and of those at most so many are kept: some two weeks."""
 STEP_SIZE = 0.5
 """Usual size of a step in slip or side (parts of W)."""
 LONGEST_INNOVATION = 4.0

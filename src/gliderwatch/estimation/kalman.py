@@ -271,7 +271,7 @@ def _tested(
     way = found.usual if found.usual is not None and found.best.cause is Cause.FLOW else found.best
     steps = _jump(params.flow)
     update = _update(state, way, steps)
-    return step_test.steps(state.bank, passage_matrix(passage), update, steps, params.front)
+    return step_test.steps(state.bank, passage_matrix(passage), update, steps, params.front, state.dives)
 
 
 def _passage(state: JointState, seen: Observation, lat: float, params: JointParams) -> Passage:
@@ -350,7 +350,9 @@ def _mixed(state: JointState, ways: list[Explained], steps: Array) -> JointState
     for way in kept:
         cov = _cov(state, way, steps)
         update = _update_of(cov, way)
-        means.append(state.x + update.gain @ way.innovation)
+        mean = state.x + update.gain @ way.innovation
+        mean[SLIP] += way.loss
+        means.append(mean)
         covs.append(cov - update.gain @ (update.rows @ cov))
     weights = np.array([way.weight / total for way in kept])
     x = weights @ np.array(means)

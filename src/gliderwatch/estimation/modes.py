@@ -37,6 +37,7 @@ from gliderwatch.estimation.constants import (
     WING_ODDS,
     WING_SIDE,
     WING_SLIP,
+    WING_SPREAD,
 )
 from gliderwatch.estimation.dive_measurement import OWN, SIDE, SLIP, Measured, expected
 from gliderwatch.model import Array
@@ -60,13 +61,14 @@ class Cause(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Mode:
-    """``chance`` of it on a dive, how large what it opens usually is (``size``, m/s, a component), and the
-    ``words`` for a dive that it explains best."""
+    """``chance`` of it on a dive, how large what it opens usually is (``size``, m/s, a component), the
+    ``words`` for a dive that it explains best, and the ``loss`` (part of W) that is expected of it."""
 
     cause: Cause
     chance: float
     size: float
     words: str = ""
+    loss: float = 0.0
 
 
 MODES = (
@@ -111,9 +113,9 @@ def _with_chances(modes: tuple[Mode, ...], chances: tuple[tuple[Cause, float], .
     )
 
 
-ROLLED = Mode(Cause.WING, WING_ODDS, WING_SLIP)
-"""Beside these where the glider has just begun to roll otherwise, which little else does.
-``size`` is of slip."""
+ROLLED = Mode(Cause.WING, WING_ODDS, WING_SPREAD, loss=WING_SLIP)
+"""Beside these where the glider has just begun to roll otherwise, which little else does. ``size`` is of
+slip, and no lost wing makes a glider faster."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,12 +123,14 @@ class Explained:
     """A dive as one of the modes has it.
 
     ``cause`` with its ``weight``, and whether the glider ``believes``: the speed that it tells fits.
-    ``rows`` ((m, 5)), ``innovation`` ((m,)) and ``noise`` ((m, m)) are linear about the likeliest state;
+    ``loss`` (part of W) is expected of slip before the dive, ``size`` what is opened. ``rows`` ((m, 5)),
+    ``innovation`` ((m,)) and ``noise`` ((m, m)) are linear about the likeliest state;
     ``square`` is the innovation normalised.
     """
 
     cause: Cause
     size: float
+    loss: float
     weight: float
     believes: bool
     rows: Array
@@ -179,15 +183,17 @@ def explain(
     fits = (True, False) if tells is not None else (False,)
     each = [(mode, believes) for mode in modes for believes in fits]
     opened, wrong, logs = _opened(each, cov, jumped, measured)
-    state, values = np.tile(x, (len(each), 1)), measured.values
+    before, values = np.tile(x, (len(each), 1)), measured.values
+    before[:, SLIP] += [mode.loss for mode, _ in each]
+    state = before
     for _ in range(ITERATIONS):
         found, slope, noise = expected(state, measured)
         noise = noise + wrong
         turned = opened @ slope.transpose(0, 2, 1)
         s = slope @ turned + noise
         inverse = np.linalg.inv(s)
-        innovation = values - found - (slope @ (x - state)[:, :, None])[:, :, 0]
-        state = x + (turned @ (inverse @ innovation[:, :, None]))[:, :, 0]
+        innovation = values - found - (slope @ (before - state)[:, :, None])[:, :, 0]
+        state = before + (turned @ (inverse @ innovation[:, :, None]))[:, :, 0]
         free = state[:, OWN].copy()
         state[:, OWN] = np.clip(free, 0.0, FASTEST)
         state[:, SLIP:] = np.clip(state[:, SLIP:], [LEAST_SLIP, -MOST_SIDE], [MOST_SLIP, MOST_SIDE])
@@ -203,7 +209,15 @@ def explain(
     inverse[at] = np.linalg.inv(slope[at] @ turned[at] + noise[at])
     return [
         Explained(
-            mode.cause, mode.size, float(weights[k]), believes, slope[k], innovation[k], noise[k], inverse[k]
+            mode.cause,
+            mode.size,
+            mode.loss,
+            float(weights[k]),
+            believes,
+            slope[k],
+            innovation[k],
+            noise[k],
+            inverse[k],
         )
         for k, (mode, believes) in enumerate(each)
     ]

@@ -13,6 +13,8 @@ from gliderwatch.estimation.constants import (
     CALIBRATED_FALL,
     CALIBRATED_RATIO,
     LONGEST_INNOVATION,
+    OLDER_EVERY,
+    OLDER_KEPT,
     STEP_SIZE,
     WINDOW,
 )
@@ -30,7 +32,7 @@ from gliderwatch.model import Array, readonly
 
 @dataclass(frozen=True, slots=True)
 class Bank:
-    """Hypotheses of a step, one for each recent dive, oldest first.
+    """Hypotheses of a step, one for each recent dive and one for some of the older ones, oldest first.
 
     ``shift`` ((k, n, q)): by how much the state differs from what the filter makes of it, for each of the q
     numbers that describe a step; ``info`` ((k, q, q)) and ``score`` ((k, q)): information about these
@@ -61,14 +63,13 @@ class Step:
     """The likeliest step.
 
     ``ratio`` is twice the log likelihood ratio: where there was no step, of chi-square with one degree of
-    freedom at each dive. ``which`` number and ``sigma`` of the step; ``dives`` since it (1: before the
-    last one); ``shifts``, ``info`` and ``score``: the hypothesis, as in the `Bank`.
+    freedom at each dive. ``which`` number and ``sigma`` of the step; ``shifts``, ``info`` and ``score``: the
+    hypothesis, as in the `Bank`.
     """
 
     ratio: float
     which: int
     sigma: float
-    dives: int
     shifts: Array
     info: Array
     score: Array
@@ -90,17 +91,17 @@ class Step:
         return np.asarray((shifted + shifted.T) / 2)
 
 
-def advance(bank: Bank, shape: Array, precision: Array, kept: Array, update: Update) -> Bank:
-    """The bank after one more dive.
+def advance(bank: Bank, shape: Array, precision: Array, kept: Array, update: Update, dives: int = 1) -> Bank:
+    """The bank after one more dive, the one after ``dives`` before it.
 
     ``shape`` ((n, q)) is what a step does to the state, ``precision`` ((q, q)) what is known of its size
     before, ``kept`` ((n, n)) the transition to the dive.
     """
     n, q = shape.shape
-    old = 1 - WINDOW
-    shift = np.concatenate([kept @ bank.shift.reshape(-1, n, q)[old:], shape[None]])
-    info = np.concatenate([bank.info.reshape(-1, q, q)[old:], precision[None]])
-    score = np.concatenate([bank.score.reshape(-1, q)[old:], np.zeros((1, q))])
+    held = _held(len(bank.score), dives)
+    shift = np.concatenate([kept @ bank.shift.reshape(-1, n, q)[held], shape[None]])
+    info = np.concatenate([bank.info.reshape(-1, q, q)[held], precision[None]])
+    score = np.concatenate([bank.score.reshape(-1, q)[held], np.zeros((1, q))])
     seen = update.rows @ shift
     weighted = np.swapaxes(seen, 1, 2) @ update.weight
     return Bank(
@@ -108,6 +109,21 @@ def advance(bank: Bank, shape: Array, precision: Array, kept: Array, update: Upd
         readonly(info + weighted @ seen),
         readonly(score + weighted @ update.innovation),
     )
+
+
+def _held(n: int, dives: int) -> list[int]:
+    """Places of the ``n`` hypotheses that are held beside a new one.
+
+    All of the last `WINDOW`. Of the older ones one in `OLDER_EVERY` dives: on a long leg a step that the
+    glider does not know of cannot be seen before it turns, days later.
+
+    >>> _held(3, 7), len(_held(24, 7)), len(_held(24, 12))
+    ([0, 1, 2], 23, 24)
+    """
+    older = max(n - WINDOW, 0)
+    stays = n < WINDOW or dives % OLDER_EVERY == 0
+    held = [*range(older), *range(older if stays else older + 1, n)]
+    return held[max(len(held) - (WINDOW - 1 + OLDER_KEPT), 0) :]
 
 
 def likeliest(bank: Bank, which: int, sign: int = 0) -> Step | None:
@@ -128,7 +144,6 @@ def likeliest(bank: Bank, which: int, sign: int = 0) -> Step | None:
         ratio=float(ratio[k]),
         which=which,
         sigma=float(info[k]) ** -0.5,
-        dives=len(ratio) - k,
         shifts=bank.shift[k],
         info=bank.info[k],
         score=bank.score[k],
@@ -186,11 +201,12 @@ def cusum_bound(slack: float, dives_between_alarms: float) -> float:
 
 
 def steps(
-    bank: Bank, matrix: Array, update: Update, jump: Array, front: float
+    bank: Bank, matrix: Array, update: Update, jump: Array, front: float, dives: int
 ) -> tuple[Step | None, Step | None, Bank]:
     """The likeliest loss (a step up in slip) and turn (one in side), and the bank with one more dive.
 
-    ``matrix`` ((n, n)) is the transition to the dive and ``update`` that of the filter. The flow may have
+    ``matrix`` ((n, n)) is the transition to the dive, after ``dives`` before, and ``update`` that of the
+    filter. The flow may have
     changed together with the step, by ``front`` (m/s, a component), which does ``jump`` ((n, 2)) to the
     state. No dive alone may prove a step.
     """
@@ -200,7 +216,7 @@ def steps(
     sizes = np.array([STEP_SIZE, STEP_SIZE, front, front])
     square = float(update.innovation @ update.weight @ update.innovation)
     believed = update.innovation * min(1.0, LONGEST_INNOVATION / math.sqrt(max(square, 1e-12)))
-    bank = advance(bank, shape, np.diag(sizes**-2), matrix, replace(update, innovation=believed))
+    bank = advance(bank, shape, np.diag(sizes**-2), matrix, replace(update, innovation=believed), dives)
     return likeliest(bank, 0, sign=1), likeliest(bank, 1), bank
 
 
