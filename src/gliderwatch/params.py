@@ -41,7 +41,7 @@ class AnomalyRule:
 
     open_after: int = 2
     open_after_severe: int = 1
-    """Dives in a row that open it when the speed is below half of the lower bound."""
+    """Dives in a row that open it when the speed is below two thirds of the lower bound."""
     clear_after: int = 2
     severity: Severity = Severity.CRITICAL
 

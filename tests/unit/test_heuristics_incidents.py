@@ -36,10 +36,10 @@ def files(n: int, apart: float, first: float = T0) -> list[Sign]:
 
 
 class TestIncidents:
-    def test_less_than_half_of_the_normal_speed_is_severe(self):
+    def test_less_than_two_thirds_of_the_lower_bound_is_severe(self):
         low = SLOW.speed_min
-        assert not is_severe(replace(SLOW, speed=0.55 * low))
-        assert is_severe(replace(SLOW, speed=0.45 * low))
+        assert not is_severe(replace(SLOW, speed=0.70 * low))
+        assert is_severe(replace(SLOW, speed=0.63 * low))
 
     @pytest.mark.parametrize("slower, holds", [(0.04, True), (0.06, False)])
     def test_an_anomaly_has_grown_worse_by_5_cm_s(self, slower, holds):

@@ -103,12 +103,17 @@ class TestAcknowledged:
         [
             ({}, True),
             ({"worst": replace(SLOW, speed=0.111)}, True),
-            ({"worst": replace(SLOW, speed=0.10)}, False),  # below half of the lower bound, 0.11
             ({"dives": 40}, True),
         ],
     )
     def test_what_is_worse(self, changes: dict[str, object], holds: bool) -> None:
         assert acknowledge(incident(), "ann", "", 0.0).holds(replace(incident(), **changes)) is holds  # type: ignore[arg-type]
+
+    @pytest.mark.parametrize(("speed", "holds"), [(0.148, True), (0.145, False)])
+    def test_below_two_thirds_of_the_lower_bound_is_worse(self, speed: float, holds: bool) -> None:
+        mild = incident(worst=replace(SLOW, speed=0.15))
+        worse = incident(worst=replace(SLOW, speed=speed))  # the bound is 0.22
+        assert acknowledge(mild, "ann", "", 0.0).holds(worse) is holds
 
     def test_worse_by_severity_speed_and_flow_error(self) -> None:
         mild = incident(severity=Severity.WARNING)

@@ -126,7 +126,7 @@ def test_departure_and_severity_without_numbers():
     nothing = replace(SLOW, speed=None, p_e=None)
     assert departure(nothing, Kind.ANOMALY) == 0.0 and departure(nothing, Kind.FALSE_ALARM) == 0.0
     assert not is_severe(nothing)
-    assert not is_severe(replace(SLOW, speed=SLOW.speed_min / 2))
+    assert not is_severe(replace(SLOW, speed=0.667 * SLOW.speed_min))
     assert is_severe(replace(SLOW, speed=-0.1))
 
 

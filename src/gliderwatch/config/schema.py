@@ -114,7 +114,7 @@ class Anomaly(Section):
     )
     open_after_severe: Count = Field(
         default=_R.anomaly.open_after_severe,
-        description="Dives in a row that open it when the speed is below half of the lower bound.",
+        description="Dives in a row that open it when the speed is below two thirds of the lower bound.",
     )
     clear_after: Count = Field(
         default=_R.anomaly.clear_after, description="Normal dives in a row that clear it."

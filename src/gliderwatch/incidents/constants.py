@@ -7,8 +7,10 @@ named by `benchmarks/mutations.py` pin what it is for.
 from __future__ import annotations
 
 # Incidents
-SEVERE = 0.5
-"""Part of the lower bound of the normal range: a speed below it needs fewer dives to open an incident."""
+SEVERE = 0.667
+"""Part of the lower bound of the normal range: a speed below it needs fewer dives to open an incident. So a
+glider that lost half of its speed is there, with 0.42 to 0.5 of the usual speed left (drag takes more than
+the glider itself believes), and one that lost 30 % is not."""
 WORSE_SPEED = 0.05
 """m/s further out of the normal range than when it was acknowledged: an anomaly has grown worse."""
 WORSE_FLOW_ERROR = 0.1

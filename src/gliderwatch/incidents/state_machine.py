@@ -110,7 +110,7 @@ def _says_of_anomaly(dive: Assessment, is_open: bool) -> bool | None:
 
 
 def is_severe(dive: Assessment) -> bool:
-    """Whether the speed is below half of the lower bound of the normal range, and surely below that bound."""
+    """Whether a speed is below two thirds of the lower bound of the normal range, and surely below that."""
     if dive.speed is None:
         return False
     sigma = dive.evidence.get("speed_sigma", 0.0)
