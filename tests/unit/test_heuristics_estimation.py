@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gliderwatch.estimation import adaptive, glider, kalman, modes, verdict
+from gliderwatch.estimation import adaptive, dive_measurement, glider, kalman, modes, verdict
 from gliderwatch.estimation.dive_measurement import (
     OWN,
     SIDE,
@@ -508,6 +508,64 @@ class TestOpened:
         steps_of_flow = kalman._jump(JointParams().flow)
         opened = kalman._cov(state, wing, steps_of_flow) - state.cov
         assert np.sqrt(opened[[SLIP, SIDE], [SLIP, SIDE]]) == pytest.approx([0.27, 0.15])
+
+
+class TestUpdate:
+    """The iterated update of one dive, and the mixture of what it gives under each mode."""
+
+    def measured(self, noise: float = 0.01) -> Measured:
+        return Measured(observe(EAST), None, 1.0, Slipping(0.1, noise, None))
+
+    def test_no_glider_flies_below_2_cm_s(self):
+        shown = dive_measurement.expected(np.zeros((1, 5)), self.measured())[0][0]
+        own = shown[:2] - shown[2:4]  # g - c = W h
+        assert np.hypot(*own) == pytest.approx(0.02 * observe(EAST).steadiness)
+
+    def test_a_dive_is_1_percent_off_the_speed(self):
+        """With W at 0.3 m/s that is 3 mm/s along the heading, of the current too."""
+        x = np.array([[0.0, 0.0, 0.3, 0.0, 0.0]])
+        seen = observe(EAST)
+        noise = dive_measurement.expected(x, self.measured(JointParams().own_noise))[2][0]
+        along = noise[2, 2] - seen.current_sigma**2
+        assert math.sqrt(along) == pytest.approx(0.003 * seen.heading[0])
+
+    def test_the_update_is_iterated_twice(self, monkeypatch):
+        calls = []
+
+        def counted(*arguments):
+            calls.append(arguments)
+            return dive_measurement.expected(*arguments)
+
+        monkeypatch.setattr(modes, "expected", counted)
+        TestOpened().explained()
+        assert len(calls) == 2
+
+    def test_a_speed_that_none_can_fly_speaks_against_a_mode(self, monkeypatch):
+        """By the square of what is beyond, in 2 cm/s."""
+        odds = []
+        for beyond in (modes.BEYOND, 1.0, 1e9):
+            monkeypatch.setattr(modes, "BEYOND", beyond)
+            weights = {way.cause: way.weight for way in self.backwards()}
+            odds.append(math.log(weights[Cause.USUAL] / weights[Cause.GROUND]))
+        assert (odds[0] - odds[2]) / (odds[1] - odds[2]) == pytest.approx(1 / 0.02**2, rel=1e-3)
+        assert odds[0] < odds[2]
+
+    def backwards(self) -> list[modes.Explained]:
+        """A glider whose ground velocity and current have it fly backwards, at 3 cm/s."""
+        seen = observe(dive(0, Way(heading=0.0, own=-0.03, speed=-0.03)))
+        x, cov = np.array([0.05, 0.02, 0.05, 0.0, 0.0]), np.diag([1e-2, 1e-2, 4e-4, 1e-4, 1e-4])
+        steps_of_flow = np.diag([1.0, 1.0, 0.0, 0.0, 0.0])
+        measured = Measured(seen, None, 1.0, Slipping(0.0, 0.01, None))
+        return modes.explain(x, cov, steps_of_flow, measured, MODES)
+
+    @pytest.mark.parametrize(("weight", "counts"), [(0.007, False), (0.015, True)])
+    def test_a_mode_of_less_than_a_percent_is_left_out(self, weight, counts):
+        state = kalman.init(JointParams(), 0.0)
+        usual, speed, *_ = TestOpened().explained()
+        ways = [replace(usual, weight=1 - weight), replace(speed, weight=weight)]
+        steps_of_flow = kalman._jump(JointParams().flow)
+        alone = kalman._mixed(state, ways[:1], steps_of_flow)
+        assert (kalman._mixed(state, ways, steps_of_flow).x.tolist() != alone.x.tolist()) is counts
 
 
 class TestAlgorithmOfThePaper:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gliderwatch.estimation import step_test
-from gliderwatch.estimation.constants import OLDER_EVERY, OLDER_KEPT, WINDOW
+from gliderwatch.estimation.constants import OLDER_EVERY, WINDOW
 from gliderwatch.estimation.step_test import (
     Bank,
     Update,
@@ -101,7 +101,7 @@ def test_bank_holds_each_recent_dive_and_some_older_ones(z):
     assert len(banked(updates[:WINDOW], np.eye(2)).score) == WINDOW
     # of the dives before the window one in `OLDER_EVERY` is held: here the one that left it at dive 24
     assert len(banked(updates[: WINDOW + OLDER_EVERY - 1], np.eye(2)).score) == WINDOW + 1
-    assert len(banked(updates, np.eye(2)).score) == WINDOW + OLDER_KEPT
+    assert len(banked(updates, np.eye(2)).score) == WINDOW + 8
     assert likeliest(Bank(), 0) is None
 
 
