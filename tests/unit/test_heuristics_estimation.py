@@ -444,13 +444,14 @@ class TestReference:
 
 class TestSeveralDives:
     def test_what_is_remembered_of_forty_dives(self):
-        """Steps are looked for over 24 dives, a compass over 8; ranges and ratios rest on 24 and 12."""
+        """Steps are looked for over 24 dives, and two older ones; a compass over 8; ranges and ratios rest on
+        24 and 12."""
         state = SpeedState()
         for each in mission([Way()] * 40):
             state, _ = step(
                 state, known_by(each, depth_rate_dive=0.14, depth_rate_climb=-0.14), SpeedParams()
             )
-        assert len(state.filter.bank.score) == 24
+        assert len(state.filter.bank.score) == 24 + 2
         assert len(state.misfits) == 8
         assert len(state.normal.speeds) == 24
         assert len(state.ratios.vertical) == 12
