@@ -118,7 +118,7 @@ def test_speed_stays_where_it_was_through_head_currents_and_fronts(shared_data, 
 
 def test_no_step_is_told(shared_data, name):
     _, verdicts = run(dives(shared_data, name))
-    assert all(v.info is None or v.info.told is None for v in verdicts)
+    assert all(v.info is None or v.info.proven is None for v in verdicts)
 
 
 @pytest.mark.parametrize(("part", "within", "wanted"), [(0.5, 2, 0.9), (0.3, 4, 0.9)])
@@ -175,7 +175,7 @@ def test_speed_in_spirals_is_that_of_depth_rate_and_pitch(shared_data):
     assert circles(made)
     for verdict in (verdicts[k] for k in circles(made)):
         assert verdict.flag is Flag.NORMAL
-        assert verdict.info.believes
+        assert verdict.info.kinematic_fits
         assert 0.19 < verdict.info.estimate.speed < 0.24
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from alert_support import DISAGREE, SLOW
-from gliderwatch.estimation.healthy_baseline import QUANTITIES, Baseline, learn, told
+from gliderwatch.estimation.healthy_baseline import QUANTITIES, Baseline, evidence_of, learn
 from gliderwatch.messages.baseline import WORDINGS, usual
 from gliderwatch.messages.causes import DRAG, FLOW, HEAVY, TRIM, WING, Cause, likeliest
 from gliderwatch.messages.evidence import LINES, weigh
@@ -33,7 +33,7 @@ def after(**changes: float) -> dict[str, float]:
     for _ in range(12):
         known = learn(known, DiveFeatures(**HEALTHY))
     dive = DiveFeatures(**HEALTHY | changes)
-    return {**evidence(dive), **told(known, dive)}
+    return {**evidence(dive), **evidence_of(known, dive)}
 
 
 def slow(**changes: float) -> Assessment:
@@ -138,7 +138,7 @@ def test_fixed_bounds_only_where_nothing_is_usual() -> None:
     known = Baseline()
     for _ in range(6):
         known = learn(known, dive)
-    pro, con = weigh(replace(bare, evidence={**tilted, **told(known, dive)}), Kind.ANOMALY, WING)
+    pro, con = weigh(replace(bare, evidence={**tilted, **evidence_of(known, dive)}), Kind.ANOMALY, WING)
     assert not any(line.startswith("mean roll") for line in (*pro, *con))
     assert "roll 22°, as usual (17 to 26)" in con
 

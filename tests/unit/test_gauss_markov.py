@@ -117,7 +117,7 @@ def test_a_shelf_sea_is_no_slow_glider():
     state, params = None, JointParams()
     for k, dive in enumerate(mission(ways)):
         state, info = step(state, dive, params)
-        assert info.told is None
+        assert info.proven is None
         if k > 24:
             assert info.estimate.speed == pytest.approx(0.23, abs=0.02)
     assert state.process_scale < 0.5  # it was all tide

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gliderwatch.estimation import healthy_baseline
-from gliderwatch.estimation.healthy_baseline import Baseline, learn, told
+from gliderwatch.estimation.healthy_baseline import Baseline, evidence_of, learn
 from gliderwatch.messages.evidence import usual
 from gliderwatch.model import Dive, DiveFeatures
 from gliderwatch.navigation.dives import Navigation, extend
@@ -144,13 +144,17 @@ def test_missing_numbers_are_left_out() -> None:
 
 
 def test_what_is_told() -> None:
-    found = told(taught(healthy()), DiveFeatures(**DIVE | {"duration": 4.5 * 3600}))
+    found = evidence_of(taught(healthy()), DiveFeatures(**DIVE | {"duration": 4.5 * 3600}))
     assert found["surfacing_delay_h"] == pytest.approx(4.5 - found["duration_h_usual"])
     assert found["roll_mean_low"] < found["roll_mean_usual"] < found["roll_mean_high"]
     assert found["pitch_asymmetry"] == pytest.approx(-0.01)
     assert found["yos_per_hour"] == pytest.approx(6 / 4.5)
     assert found.keys().isdisjoint(DIVE)
-    assert set(told(Baseline(), DiveFeatures(**DIVE))) == {"pitch_asymmetry", "rate_ratio", "yos_per_hour"}
+    assert set(evidence_of(Baseline(), DiveFeatures(**DIVE))) == {
+        "pitch_asymmetry",
+        "rate_ratio",
+        "yos_per_hour",
+    }
 
 
 def test_memory_is_bounded_and_survives_the_state_file() -> None:
@@ -185,7 +189,7 @@ def test_on_healthy_missions_little_points_to_the_glider(shared_data: Path, name
         dives |= {dive.t_dive: dive for dive in news}
     known, odd, compared = Baseline(), 0, 0
     for t in sorted(t for t in dives if dives[t].track is not None):
-        more = told(known, dives[t].features)
+        more = evidence_of(known, dives[t].features)
         if t - min(dives) > 12 * 3600:
             numbers = usual({**evidence(dives[t].features), **more})
             odd, compared = odd + any(n.telling for n in numbers), compared + bool(numbers)

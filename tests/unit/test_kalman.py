@@ -262,17 +262,17 @@ def lost_wing(seed, heading, onset=20, n=44):
 def test_hidden_loss_is_found_when_the_heading_changes(seed):
     made = lost_wing(seed, lambda k: 1.6 * (k // 3))
     _, infos = run(mission(made))
-    told = [k for k, info in enumerate(infos) if info.told is not None]
+    told = [k for k, info in enumerate(infos) if info.proven is not None]
     assert told
     assert 20 < told[0] <= 36  # within two days
-    assert infos[told[0]].told.size > 0.1
+    assert infos[told[0]].proven.size > 0.1
     assert infos[-1].estimate.speed == pytest.approx(0.115, abs=3 * infos[-1].estimate.sigma)
 
 
 def test_hidden_loss_on_a_steady_course_is_not_made_up():
     """Nothing can tell it from a flow that changed: the test stays silent."""
     _, infos = run(mission(lost_wing(1, lambda k: 0.4)))
-    assert all(info.told is None for info in infos)
+    assert all(info.proven is None for info in infos)
     assert infos[-1].loss.ratio < 16
 
 
@@ -291,7 +291,7 @@ def test_wrong_compass_turns_with_the_heading(turned):
     made = ways(44, 6, lambda k: 1.6 * (k // 3))
     made = [w if k < 20 else replace(w, turned=turned) for k, w in enumerate(made)]
     _, infos = run(mission(made))
-    assert any(info.told is not None for info in infos[20:])
+    assert any(info.proven is not None for info in infos[20:])
     side, sigma = infos[-1].estimate.side
     # the way is to the right of the heading where side is positive
     assert side == pytest.approx(0.92 * math.sin(turned), abs=3 * sigma)
@@ -300,7 +300,7 @@ def test_wrong_compass_turns_with_the_heading(turned):
 @pytest.mark.parametrize("seed", range(6))
 def test_healthy_mission_tells_no_step(seed):
     _, infos = run(mission(ways(80, 100 + seed, lambda k: 1.6 * (k // 4))))
-    assert all(info.told is None for info in infos)
+    assert all(info.proven is None for info in infos)
 
 
 # --------------------------------------------------------------------------- begin and end

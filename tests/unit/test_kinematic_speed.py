@@ -165,7 +165,7 @@ def test_short_dive_tells_nothing_and_teaches_nothing():
 
 def test_healthy_dives_teach_the_ratio():
     state, verdicts = run(telling(mission(ways(10, 1, lambda k: 0.7 * k)), [0.25] * 10))
-    assert [v.info.believes for v in verdicts] == [True] * 10
+    assert [v.info.kinematic_fits for v in verdicts] == [True] * 10
     assert np.median(state.ratios.vertical) == pytest.approx(1 / 1.17, rel=0.03)
     assert state.ratios.onboard == ()
 
@@ -199,7 +199,7 @@ def test_glider_that_lies_is_not_believed(tells):
     dives that are remembered tell the new ratio."""
     made = ways(20, 5, lambda k: 0.4 * k)
     _, verdicts = run(telling(mission(made), [0.25] * 12 + [tells] * 8))
-    assert [v.info.believes for v in verdicts[12:]] == [False] * 6 + [True] * 2
+    assert [v.info.kinematic_fits for v in verdicts[12:]] == [False] * 6 + [True] * 2
     assert {v.flag for v in verdicts} == {Flag.NORMAL}
     speeds = [v.info.estimate.speed for v in verdicts[12:]]
     assert speeds == pytest.approx([0.23] * 8, abs=0.02)

@@ -262,7 +262,7 @@ VAGUE = 0.3
 COMPASS_OFF = 0.15
 """rad: the least error of a compass that is reported."""
 MISFITS_KEPT = 8
-"""Dives back over which a wrong current is told from a wrong compass."""
+"""Dives back over which a wrong current is held apart from a wrong compass."""
 CLEARLY = 6.0
 """By how much the chi-square of one explanation has to be below that of the other."""
 TURNED = 0.785

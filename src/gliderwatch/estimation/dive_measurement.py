@@ -60,7 +60,7 @@ class Observation:
     ``heading_cov`` ((2, 2)); ``current`` c (m/s, (2,), None: not reported) with standard error
     ``current_sigma`` a component; ``slip`` the part of W that an angle of attack takes, by physics;
     ``unseen`` the part of the flight within gaps between headings. ``is_free``: no heading was measured, so
-    that its direction is that of g - c and nothing is told by what is across.
+    that its direction is that of g - c and what is across says nothing.
     """
 
     start: float
@@ -303,10 +303,10 @@ class Slipping:
 @dataclass(frozen=True, slots=True)
 class Measured:
     """The measurements of a dive: ``values`` ((m,)): g (2), c (2, where there is ``current``), w (1, where
-    it ``tells``)."""
+    there is a ``kinematic`` speed)."""
 
     seen: Observation
-    tells: KinematicSpeed | None
+    kinematic: KinematicSpeed | None
     scale: float
     slipping: Slipping
 
@@ -321,8 +321,8 @@ class Measured:
         parts = [self.seen.ground]
         if self.seen.current is not None:
             parts.append(self.seen.current)
-        if self.tells is not None:
-            parts.append(np.array([self.tells.speed]))
+        if self.kinematic is not None:
+            parts.append(np.array([self.kinematic.speed]))
         return np.concatenate(parts)
 
 
@@ -371,11 +371,11 @@ def expected(x: Array, measured: Measured) -> tuple[Array, Array, Array]:
     noise[:, 2:4, 2:4] = measured.scale * seen.current_sigma**2 * np.eye(2)
     along = np.tile((own * slip_sigma)[:, None] * h, 2)
     noise[:, :4, :4] += along[:, :, None] * along[:, None, :]
-    if measured.tells is not None:
-        noise[:, 4, 4] = measured.tells.sigma**2
+    if measured.kinematic is not None:
+        noise[:, 4, 4] = measured.kinematic.sigma**2
     found = np.concatenate(values, axis=1)
     if measured.has_current:
-        m = 4 if measured.tells is None else 5
+        m = 4 if measured.kinematic is None else 5
         return found[:, :m], slope[:, :m], noise[:, :m, :m]
-    there = [0, 1] if measured.tells is None else [0, 1, 4]
+    there = [0, 1] if measured.kinematic is None else [0, 1, 4]
     return found[:, there], slope[:, there], noise[:, there][:, :, there]

@@ -11,7 +11,7 @@ import numpy as np
 from gliderwatch.estimation import adaptive
 from gliderwatch.estimation.adaptive import Learner
 from gliderwatch.estimation.constants import APART, PROVISIONAL, REPORTED
-from gliderwatch.estimation.healthy_baseline import Baseline, learn, told
+from gliderwatch.estimation.healthy_baseline import Baseline, evidence_of, learn
 from gliderwatch.estimation.kalman import JointEstimate, JointInfo, JointParams, expected_flow
 from gliderwatch.estimation.speed_range import RangeParams
 from gliderwatch.estimation.unassessed import Mean, Reference, of_learnt, of_model, of_tides, unassessed
@@ -71,8 +71,8 @@ def joint_step(
     """
     after, verdict = step_speed(state.speed, dive, speed_params(params), frozen)
     if verdict.info is None:
-        told = None if verdict.flag is None else int(verdict.flag)
-        return state, replace(unassessed(dive, params, digest, verdict.reason), flag=told)
+        flag = None if verdict.flag is None else int(verdict.flag)
+        return state, replace(unassessed(dive, params, digest, verdict.reason), flag=flag)
     found, current = verdict.info.estimate, dive.current if other is None else other.current
     flow = (float(found.flow[0]), float(found.flow[1]))
     size = hypot(current.u, current.v) if current is not None else 0.0
@@ -165,7 +165,7 @@ def step(
         after = state if learnt is state.learner else replace(state, learner=learnt)
     if dive.track is None or dive.start is None or dive.end is None:
         return after, assessment
-    evidence = {**assessment.evidence, **told(state.baseline, dive.features)}
+    evidence = {**assessment.evidence, **evidence_of(state.baseline, dive.features)}
     after = _with_currents(after, dive, params, assessment.flag)
     if assessment.flag == Flag.NORMAL and not frozen:
         after = replace(after, baseline=learn(state.baseline, dive.features))

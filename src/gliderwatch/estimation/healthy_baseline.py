@@ -127,7 +127,7 @@ def compare(baseline: Baseline, features: DiveFeatures) -> dict[str, Usual]:
     return out
 
 
-def told(baseline: Baseline, features: DiveFeatures) -> dict[str, float]:
+def evidence_of(baseline: Baseline, features: DiveFeatures) -> dict[str, float]:
     """What a dive adds to its evidence: `derived` numbers, and what is usual.
 
     ``_low``, ``_usual`` and ``_high`` are put after each name that `compare` knows; ``surfacing_delay_h``

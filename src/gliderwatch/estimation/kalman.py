@@ -180,9 +180,9 @@ class JointInfo:
 
     ``seen`` of it and the ``estimate`` after it; ``single_sigma`` (m/s) how well this dive alone tells W
     (infinite: not at all); ``across`` what of g - c is across the heading with its standard error (m/s,
-    None: no current); ``cause`` with the ``odds`` of all; ``believes``: W as the glider tells it was told and
-    fits; ``nis`` of the ``dof`` innovations used; ``loss``
-    and ``turn`` the likeliest steps in slip and side, ``told`` the one that the test speaks of just now.
+    None: no current); ``cause`` with the ``odds`` of all; ``kinematic_fits``: there is a kinematic speed, and
+    it fits; ``nis`` of the ``dof`` innovations used; ``loss`` and ``turn`` the likeliest steps in slip and
+    side, ``proven`` the one that is just now too likely for chance.
     """
 
     seen: Observation
@@ -191,12 +191,12 @@ class JointInfo:
     across: tuple[float, float] | None
     cause: Cause
     odds: dict[str, float]
-    believes: bool
+    kinematic_fits: bool
     nis: float
     dof: int
     loss: Step | None
     turn: Step | None
-    told: Step | None
+    proven: Step | None
 
 
 def init(params: JointParams, t: float) -> JointState:
@@ -214,13 +214,13 @@ def step(
     params: JointParams,
     usual: float | None = None,
     hint: bool = False,
-    tells: KinematicSpeed | None = None,
+    kinematic: KinematicSpeed | None = None,
 ) -> tuple[JointState | None, JointInfo | None]:
     """The state after one more dive, and what was found in it; a dive without a track changes nothing.
 
     ``usual`` is the healthy speed through the water (m/s) where it is known; ``hint`` says that something
-    else speaks for a wing that was lost or bent just now; ``tells`` is W as the glider tells it
-    beside the current.
+    else speaks for a wing that was lost or bent just now; ``kinematic`` is W as depth rate and pitch,
+    or the mean on board, have it.
     """
     if dive.track is None or dive.start is None or dive.end is None:
         return state, None
@@ -230,14 +230,14 @@ def step(
     passage = _passage(state, seen, dive.start.lat, params)
     state = _predicted(state, seen, passage, params)
     slipping = Slipping(params.slip * seen.slip, math.sqrt(state.tested) * params.own_noise, usual)
-    found = _explained(state, Measured(seen, tells, state.tested, slipping), params, hint)
+    found = _explained(state, Measured(seen, kinematic, state.tested, slipping), params, hint)
     believed = seen.own_speed()
     across = _across(state, seen, believed)
     loss, turn, bank = _tested(state, found, passage, params)
     # where no heading was measured, what looks like a step is a turn that was not seen
-    told = None if seen.is_free else step_test.told(loss, turn, params.alarms_per_month)
+    proven = None if seen.is_free else step_test.proven(loss, turn, params.alarms_per_month)
     after = _learnt(state, _mixed(state, found.ways, _jump(params.flow)), found, passage, across)
-    after = _opened(replace(after, bank=bank, end=dive.end), told)
+    after = _opened(replace(after, bank=bank, end=dive.end), proven)
     return after, JointInfo(
         seen=seen,
         estimate=_estimate(after, seen, params, slipping),
@@ -245,12 +245,12 @@ def step(
         across=across,
         cause=found.best.cause,
         odds=found.odds,
-        believes=found.best.believes,
+        kinematic_fits=found.best.kinematic_fits,
         nis=found.best.square,
         dof=len(found.best.innovation),
         loss=loss,
         turn=turn,
-        told=told,
+        proven=proven,
     )
 
 
@@ -411,15 +411,15 @@ def _across(
     return None if found is None else (found[0], found[1] * math.sqrt(state.tested))
 
 
-def _opened(state: JointState, told: Step | None) -> JointState:
-    """The state moved by a step that was told; the test begins anew.
+def _opened(state: JointState, proven: Step | None) -> JointState:
+    """The state moved by a step that is proven; the test begins anew.
 
     Long innovations were cut for the test, so that the step may well be half as large again.
     """
-    if told is None:
+    if proven is None:
         return state
-    shift = told.shift
-    cov = state.cov + told.cov + np.outer(shift, shift) / 4
+    shift = proven.shift
+    cov = state.cov + proven.cov + np.outer(shift, shift) / 4
     return replace(state, x=readonly(_bounded(state.x + shift)), cov=readonly(cov), bank=Bank())
 
 

@@ -52,7 +52,8 @@ class Ratios:
 
 @dataclass(frozen=True, slots=True)
 class KinematicSpeed:
-    """W as told (m/s) with its standard error and the chance that it ``lies``; ``is_prompt``: no lag."""
+    """W (m/s) by depth rate and pitch or by the glider's own mean, with its standard error and the chance
+    that it ``lies``; ``is_prompt``: no lag."""
 
     speed: float
     sigma: float

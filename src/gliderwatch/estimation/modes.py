@@ -122,7 +122,7 @@ slip, and no lost wing makes a glider faster."""
 class Explained:
     """A dive as one of the modes has it.
 
-    ``cause`` with its ``weight``, and whether the glider ``believes``: the speed that it tells fits.
+    ``cause`` with its ``weight``; ``kinematic_fits``: whether the kinematic speed has to do with W.
     ``loss`` (part of W) is expected of slip before the dive, ``size`` what is opened. ``rows`` ((m, 5)),
     ``innovation`` ((m,)) and ``noise`` ((m, m)) are linear about the likeliest state;
     ``square`` is the innovation normalised.
@@ -132,7 +132,7 @@ class Explained:
     size: float
     loss: float
     weight: float
-    believes: bool
+    kinematic_fits: bool
     rows: Array
     innovation: Array
     noise: Array
@@ -149,7 +149,7 @@ class Explanations:
     """A dive in all modes.
 
     ``ways`` with weights that add up to 1; ``odds`` of each cause; ``best`` the weightiest way of the
-    likeliest cause, ``usual`` the usual one that believes what the best does (None: there is none).
+    likeliest cause, ``usual`` the usual one that does so with the same kinematic speed (None: none).
     """
 
     ways: list[Explained]
@@ -165,7 +165,9 @@ class Explanations:
             odds[str(way.cause)] = odds.get(str(way.cause), 0) + way.weight
         cause = max(odds, key=lambda each: odds[each])
         best = max((way for way in ways if str(way.cause) == cause), key=lambda way: way.weight)
-        usual = (way for way in ways if way.cause is Cause.USUAL and way.believes == best.believes)
+        usual = (
+            way for way in ways if way.cause is Cause.USUAL and way.kinematic_fits == best.kinematic_fits
+        )
         return cls(ways, odds, best, next(usual, None))
 
 
@@ -179,9 +181,9 @@ def explain(
     """
     if not measured.has_current:
         modes = tuple(mode for mode in modes if not mode.cause.is_error)
-    tells = measured.tells
-    fits = (True, False) if tells is not None else (False,)
-    each = [(mode, believes) for mode in modes for believes in fits]
+    kinematic = measured.kinematic
+    fits = (True, False) if kinematic is not None else (False,)
+    each = [(mode, fits_it) for mode in modes for fits_it in fits]
     opened, wrong, logs = _opened(each, cov, jumped, measured)
     before, values = np.tile(x, (len(each), 1)), measured.values
     before[:, SLIP] += [mode.loss for mode, _ in each]
@@ -213,13 +215,13 @@ def explain(
             mode.size,
             mode.loss,
             float(weights[k]),
-            believes,
+            fits_it,
             slope[k],
             innovation[k],
             noise[k],
             inverse[k],
         )
-        for k, (mode, believes) in enumerate(each)
+        for k, (mode, fits_it) in enumerate(each)
     ]
 
 
@@ -228,9 +230,9 @@ def _opened(
 ) -> tuple[Array, Array, Array]:
     """Covariances of the state ((k, 5, 5)), what is added to the noise ((k, m, m)), and logarithms of the
     chances ((k,)), of modes and of whether the speed that the glider tells fits."""
-    tells, m = measured.tells, len(measured.values)
+    kinematic, m = measured.kinematic, len(measured.values)
     opened, wrong, logs = np.tile(cov, (len(each), 1, 1)), np.zeros((len(each), m, m)), np.zeros(len(each))
-    for k, (mode, believes) in enumerate(each):
+    for k, (mode, fits_it) in enumerate(each):
         logs[k] = log(mode.chance)
         if mode.cause is Cause.SPEED:
             opened[k, OWN, OWN] += mode.size**2
@@ -241,9 +243,9 @@ def _opened(
         elif mode.cause.is_error:
             at = slice(2, 4) if mode.cause is Cause.CURRENT else slice(0, 2)
             wrong[k, at, at] = mode.size**2 * np.eye(2)
-        if tells is not None:
-            logs[k] += log(1 - tells.lies) if believes else log(tells.lies)
-            if not believes:  # it may be anything: of density 1 / FASTEST
+        if kinematic is not None:
+            logs[k] += log(1 - kinematic.lies) if fits_it else log(kinematic.lies)
+            if not fits_it:  # it may be anything: of density 1 / FASTEST
                 wrong[k, -1, -1] = FASTEST**2
                 logs[k] += log(sqrt(2 * pi))
     return opened, wrong, logs

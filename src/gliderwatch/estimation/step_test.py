@@ -220,7 +220,7 @@ def steps(
     return likeliest(bank, 0, sign=1), likeliest(bank, 1), bank
 
 
-def told(loss: Step | None, turn: Step | None, alarms_per_month: float) -> Step | None:
+def proven(loss: Step | None, turn: Step | None, alarms_per_month: float) -> Step | None:
     """The step that is too likely for chance, if there is one."""
     bound = ratio_bound(alarms_per_month)
     return next((step for step in (loss, turn) if step is not None and step.ratio > bound), None)

@@ -167,7 +167,7 @@ class SpeedParams:
     its place (None: not at all). ``confidence`` is by how many standard errors a speed must be outside;
     ``gate`` (standard errors) and ``least`` (m/s) are of the test across the heading; ``vague`` is the
     standard error, as part of the usual speed, above which a dive says nothing; ``turned`` (rad) the
-    least error of a compass that is told.
+    least error of a compass that is reported.
     """
 
     joint: JointParams = JointParams()
@@ -232,25 +232,29 @@ def step(
     rolled = state.rolled + 1 if _rolls(state, dive) else 0
     usual = learnt.usual if learnt else None
     # the first of two dives may have been half over when it happened
-    told = kinematic_speed(state.ratios, dive.features)
-    estimate, info = kalman.step(state.filter, dive, params.joint, usual, hint=1 <= rolled <= 2, tells=told)
+    kinematic = kinematic_speed(state.ratios, dive.features)
+    estimate, info = kalman.step(
+        state.filter, dive, params.joint, usual, hint=1 <= rolled <= 2, kinematic=kinematic
+    )
     if info is None:
-        flag, reason = _of_reckoning_alone(state, dive, told, normal, params)
+        flag, reason = _of_reckoning_alone(state, dive, kinematic, normal, params)
         return state, Verdict(flag, reason, normal, None)
     state = replace(state, filter=estimate, rolled=rolled, misfits=_misfits(state, info))
     flag, reason = _wrong(state, info, params)
     if flag is None and not reason:
-        state, flag, reason = _slow_or_fast(state, info, told, normal, params)
+        state, flag, reason = _slow_or_fast(state, info, kinematic, normal, params)
     # a course that was not steady looks slow: where no heading is known at all depth rate and pitch decide
-    assumed = flag is Flag.ANOMALY and dive.features.heading_assumed and told is not None
+    assumed = flag is Flag.ANOMALY and dive.features.heading_assumed and kinematic is not None
     if (flag is None and info.seen.is_free) or assumed:
         reason = NOT_SEEN if assumed else reason
-        flag, reason = _by_reckoning(reason, state, told, normal, params)
-        if flag is not None and told is not None:
+        flag, reason = _by_reckoning(reason, state, kinematic, normal, params)
+        if flag is not None and kinematic is not None:
             left = 1 - _usual_slip(params)
-            return state, Verdict(flag, reason, normal, info, (told.speed * left, told.sigma * left))
+            return state, Verdict(
+                flag, reason, normal, info, (kinematic.speed * left, kinematic.sigma * left)
+            )
     known = normal
-    state, flag, reason, normal = _regime(state, dive, info, told, normal, flag, reason, params)
+    state, flag, reason, normal = _regime(state, dive, info, kinematic, normal, flag, reason, params)
     before = known.usual if reason.startswith(NEW_WAY) else None
     if flag is Flag.NORMAL and not frozen:
         state = replace(_learnt(state, dive, info, at, params), trim=_trim(dive))
@@ -261,13 +265,13 @@ def _regime(
     state: SpeedState,
     dive: Dive,
     info: JointInfo,
-    told: KinematicSpeed | None,
+    kinematic: KinematicSpeed | None,
     normal: SpeedRange,
     flag: Flag | None,
     reason: str,
     params: SpeedParams,
 ) -> tuple[SpeedState, Flag | None, str, SpeedRange]:
-    """What is said of a dive out of its range that may be flown in a new way, and the state with that.
+    """What the flag is of a dive out of its range that may be flown in a new way, and the state with that.
 
     A faster glider is no fault: three dives at one speed, which depth rate and pitch do not deny, are a new
     way of flying with a range of its own. A slower one is that only where the pilot changed pitch or ballast.
@@ -275,10 +279,10 @@ def _regime(
     speed, learning = info.estimate.speed, params.learning
     faster = reason == FASTER
     explained = speed > EXPLAINED * normal.usual and retrimmed(state.trim, _trim(dive))
-    slower = flag is Flag.ANOMALY and explained and told is not None and info.believes
+    slower = flag is Flag.ANOMALY and explained and kinematic is not None and info.kinematic_fits
     if learning is None or not normal.dives or not (faster or slower):
         return (replace(state, other=()) if state.other else state), flag, reason, normal
-    if faster and told is not None and not info.believes:
+    if faster and kinematic is not None and not info.kinematic_fits:
         return replace(state, other=()), flag, reason, normal
     row = (*(each for each in state.other if abs(each / speed - 1) < AGREE), speed)
     if len(row) < ENOUGH:
@@ -317,7 +321,7 @@ def _misfits(state: SpeedState, info: JointInfo) -> tuple[Misfit, ...]:
 
 def _wrong(state: SpeedState, info: JointInfo, params: SpeedParams) -> tuple[Flag | None, str]:
     """Flag 2 where a measurement is wrong; no flag with a reason where the dive says nothing of the speed."""
-    if info.seen.current is None and not info.believes:
+    if info.seen.current is None and not info.kinematic_fits:
         return None, "no depth-averaged current"
     if info.across is not None and disagrees(state.misfits[-1], params.gate, params.least):
         return Flag.FALSE_ALARM, str(blame(state.misfits, params.gate, params.least))
@@ -333,32 +337,36 @@ def _wrong(state: SpeedState, info: JointInfo, params: SpeedParams) -> tuple[Fla
 
 
 def _of_reckoning_alone(
-    state: SpeedState, dive: Dive, told: KinematicSpeed | None, normal: SpeedRange, params: SpeedParams
+    state: SpeedState, dive: Dive, kinematic: KinematicSpeed | None, normal: SpeedRange, params: SpeedParams
 ) -> tuple[Flag | None, str]:
     """Flag 1 where a dive without track is slow by what the glider tells at once; else its reason."""
-    return _by_reckoning(dive.reason, state, told, normal, params)
+    return _by_reckoning(dive.reason, state, kinematic, normal, params)
 
 
 def _by_reckoning(
-    why: str, state: SpeedState, told: KinematicSpeed | None, normal: SpeedRange, params: SpeedParams
+    why: str, state: SpeedState, kinematic: KinematicSpeed | None, normal: SpeedRange, params: SpeedParams
 ) -> tuple[Flag | None, str]:
     """The flag that depth rate and pitch alone give, where the way says nothing because of ``why``."""
-    if told is None or not told.is_prompt or state.filter is None or not normal.dives:
+    if kinematic is None or not kinematic.is_prompt or state.filter is None or not normal.dives:
         return None, why
     # no course that was steered can look like this: the bound is wide because nothing else confirms it
-    left, sigma = 1 - _usual_slip(params), params.confidence * told.sigma
-    if (told.speed + 2 * sigma) * left < normal.low:
+    left, sigma = 1 - _usual_slip(params), params.confidence * kinematic.sigma
+    if (kinematic.speed + 2 * sigma) * left < normal.low:
         return Flag.ANOMALY, f"slower than normal by depth rate and pitch alone ({why})"
-    if (told.speed - sigma / 2) * left > normal.low:
+    if (kinematic.speed - sigma / 2) * left > normal.low:
         return Flag.NORMAL, f"as fast as usual by depth rate and pitch alone ({why})"
     return None, why
 
 
 def _slow_or_fast(
-    state: SpeedState, info: JointInfo, told: KinematicSpeed | None, normal: SpeedRange, params: SpeedParams
+    state: SpeedState,
+    info: JointInfo,
+    kinematic: KinematicSpeed | None,
+    normal: SpeedRange,
+    params: SpeedParams,
 ) -> tuple[SpeedState, Flag | None, str]:
     """The flag that the speed gives, and the state with the sum of small losses and the doubts."""
-    believed = told if info.believes else None
+    believed = kinematic if info.kinematic_fits else None
     sigma_own = min(info.single_sigma, believed.sigma if believed is not None else inf)
     if sigma_own > params.vague * normal.usual:
         return state, None, "the speed cannot be known: the glider turned too much"
@@ -367,7 +375,7 @@ def _slow_or_fast(
     sigma *= ROLL_CONFIRMS if state.rolled > 1 else params.confidence
     if info.estimate.speed + sigma < normal.low:
         # depth rate and pitch would be slow as well; where they are not sent a second dive has to be slow
-        unseen = info.seen.is_free and (told is not None or not state.doubted)
+        unseen = info.seen.is_free and (kinematic is not None or not state.doubted)
         if believed is None and (unseen or (not state.doubted and _may_have_turned(info, normal))):
             reason = "slow, or it turned while its heading was not seen: the next dive will tell"
             return replace(state, doubted=1), None, reason
@@ -395,7 +403,7 @@ def _small_losses(
     state: SpeedState, info: JointInfo, normal: SpeedRange, params: SpeedParams
 ) -> tuple[SpeedState, Flag, str]:
     """Flag 1 where a loss too small for one dive has gone on for several; the state with the sum of it."""
-    if not normal.dives or (info.seen.is_free and not info.believes):
+    if not normal.dives or (info.seen.is_free and not info.kinematic_fits):
         return state, Flag.NORMAL, ""
     bound = cusum_bound(SLACK, MONTH / USUAL_DIVE / params.joint.alarms_per_month)
     found = info.estimate
@@ -439,7 +447,7 @@ def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: S
     own = info.seen.own_speed()
     if own is not None and own[1] < (2 if info.seen.is_free else 1) * OWN_SURE * own[0]:
         state = replace(state, ratios=learn_ratios(state.ratios, dive.features, own[0]))
-    if params.learning is None or info.told is not None:
+    if params.learning is None or info.proven is not None:
         return state
     before = state.filter.dives - 1 if state.filter else 0
     normal = learn(state.normal, info.estimate.speed, at, dive.features.duration, params.learning, before)
