@@ -97,7 +97,7 @@ def heard(monkeypatch: pytest.MonkeyPatch, tty: bool) -> Iterator[io.StringIO]:
 
 def say() -> None:
     """One line each of the log that tells of a file, of a message, of an error, and of a library."""
-    logs.taken(FileOutcome(BAD))
+    logs.processed(FileOutcome(BAD))
     logs.alerts([operator(NASTY)])
     logs.log.warning("folder left out", reason=f"{PATH} cannot be read", paths=[PATH])
     logs.log.info("seen", path=BARE)

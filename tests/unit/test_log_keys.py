@@ -68,7 +68,7 @@ def test_every_line_says_what_it_is_about_or_is_of_the_service_itself() -> None:
 def test_what_is_told_of_files_and_messages_has_their_keys() -> None:
     about, operator = alert("bruce/anomaly/1", glider="bruce"), alert("operator/disk/1", glider="")
     with structlog.testing.capture_logs() as lines:
-        logs.taken(
+        logs.processed(
             FileOutcome(File("/r/bruce/from-glider/a.sbd", 1, 1, Status.TAKEN, "bruce", "bruce-2024-1-0-0"))
         )
         logs.alerts([about, operator])

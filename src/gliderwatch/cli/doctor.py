@@ -224,7 +224,7 @@ def _folders(root: Path) -> Iterable[str]:
 
 
 def _file_system(path: Path) -> str:
-    """The kind of file system that a path is on; empty where it cannot be told."""
+    """The kind of file system that a path is on; empty where that is not known."""
     best, kind = -1, ""
     try:
         lines = _MOUNTS.read_text(encoding="utf-8", errors="replace").splitlines()

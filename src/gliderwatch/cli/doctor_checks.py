@@ -347,7 +347,7 @@ def state(config: Config, problems: Iterable[Problem]) -> Findings:
         yield error("state", str(problem), "ask as the user of the service; else see docs/state-file.md")
         return
     if pages != "ok":
-        cure = "stop the service, move the file away, start: all is learnt anew from the files"
+        cure = "stop the service, move the file away, start: all is made again from the files"
         yield error("state", f"{path} is damaged: {pages}", cure)
     elif version < SCHEMA:
         yield note("state", f"{path} is whole; schema {version} becomes {SCHEMA} at the next start")
@@ -366,7 +366,7 @@ def channels(config: Config, problems: Iterable[Problem], send: bool) -> Finding
         trouble = waiting.get(name)
         if name in bad:
             continue
-        said, refused = ("took a test message", try_channel(config, name)) if send else _reached(config, name)
+        how, refused = ("took a test message", try_channel(config, name)) if send else _reached(config, name)
         if refused is not None:
             cure = "compare its URL; can this machine reach the server?"
             yield error("channels", f"{name} cannot be used: {refused}", cure)
@@ -377,7 +377,7 @@ def channels(config: Config, problems: Iterable[Problem], send: bool) -> Finding
             )
             yield warning("channels", text, f"gliderwatch test-alert --channel {name}")
         else:
-            yield ok("channels", f"{name} {said}")
+            yield ok("channels", f"{name} {how}")
 
 
 def _failing(path: Path) -> dict[str, Failing]:

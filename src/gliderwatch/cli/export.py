@@ -238,8 +238,7 @@ def field(config_path: Path, name: str, out: Path, at: str | None, state: Path |
     from gliderwatch.config import load
     from gliderwatch.config.fields import moment
     from gliderwatch.messages.formatting import utc
-    from gliderwatch.service.field_file import write_field
-    from gliderwatch.service.fields import fields_of
+    from gliderwatch.service.fields import fields_of, write_field
     from gliderwatch.store.state_file import Store
 
     config = load(config_path)

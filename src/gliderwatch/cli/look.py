@@ -132,7 +132,7 @@ def doctor(config_path: Path, send: bool, as_json: bool) -> None:
 def status(config_path: Path, as_json: bool) -> None:
     """Show how the service and its gliders are.
 
-    It ends with 0: the service is alive, 1: it is not, 2: that cannot be told.
+    It ends with 0: the service is alive, 1: it is not, 2: that cannot be found out.
     """
     from gliderwatch.cli import tables
     from gliderwatch.cli.status import overview, status_as_json

@@ -102,7 +102,7 @@ def end_of_mute(date: str | None, hours: float | None, now: float) -> float:
 
 def mute_glider(config: Config, glider: str, end: float, now: float) -> list[str]:
     """Tell nothing of a glider until a time (s); what to tell who asked for it, in lines. Who waits for an
-    acknowledgement is not told of it any more either."""
+    acknowledgement is not notified of it any more either."""
     name = known_glider(config, glider)
     with writing(config) as store:
         store.notes.mute(name, end, now)

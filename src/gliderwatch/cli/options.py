@@ -68,7 +68,7 @@ def example(*lines: str) -> str:
 
 
 class Group(click.Group):
-    """The group of all commands: errors on purpose are told in words, and help is never cut."""
+    """The group of all commands: errors on purpose are shown in words, and help is never cut."""
 
     def invoke(self, ctx: click.Context) -> object:
         """Run a command; ends with 2 where it says why it cannot."""

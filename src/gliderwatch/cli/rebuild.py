@@ -30,7 +30,7 @@ from gliderwatch.store.database import connect, read_only
 from gliderwatch.store.state_file import File, Status, Store
 
 # ----------------------------------------
-# What is another after a glider was assessed anew, and how it is told.
+# What has changed after a glider was assessed again, and how it is shown.
 
 _MOST = 50
 """Dives and files named; the rest is counted."""
@@ -39,7 +39,7 @@ _WORDS = {Flag.NORMAL: "0 normal", Flag.ANOMALY: "1 anomaly", Flag.FALSE_ALARM: 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What was, and what is after all was assessed anew.
+    """What was, and what is after all was assessed again.
 
     ``files`` and ``held`` count the files and the held segments it was made from. ``dives``: how many before
     and after. ``flags``: pairs of a dive before and after whose flag is another (None: no such dive).
@@ -142,7 +142,7 @@ def _shown(i: Incident) -> str:
 
 
 # ----------------------------------------
-# A glider assessed anew from its files, with today's code and parameters, beside what is known of it.
+# A glider assessed again from its files, with today's code and parameters, beside what is known of it.
 
 Progress = Callable[[int, int], None]
 _STATE = "state.sqlite"
@@ -150,7 +150,7 @@ _STATE = "state.sqlite"
 
 @dataclass(slots=True)
 class _Work:
-    """Assessing one glider anew: the state there is, the new one, and what was found so far."""
+    """Assessing one glider again: the state there is, the new one, and what was found so far."""
 
     config: Config
     glider: str
@@ -164,7 +164,7 @@ class _Work:
 def rebuild(
     config: Config, glider: str, *, keep: bool = False, on_step: Progress = lambda done, total: None
 ) -> Change:
-    """Assess a glider anew from its files, or from the segments held where those are gone.
+    """Assess a glider again from its files, or from the segments held where those are gone.
 
     All is done in a state of its own; `keep` puts it in place of what is held, for which the service must not
     run. Raises ConfigError for an unknown glider, StateError where the state cannot be used.
@@ -179,10 +179,10 @@ def rebuild(
                 work = _Work(config, name, old, new)
                 _fill(work, maintenance.paths(db, name), maintenance.held(db, name), on_step)
                 change = compare(name, old, new, (work.files, work.held), work.problems)
-                said = as_notified(old.notified(name), new.facts(name))
+                notified = as_notified(old.notified(name), new.facts(name))
         if keep:
             with closing(connect(path)) as state, Store(state, path).guarded():
-                maintenance.replace(state, place, name, said)
+                maintenance.replace(state, place, name, notified)
     return change
 
 
@@ -249,7 +249,7 @@ def _fuller(work: _Work, identity: SegmentId) -> Segment | None:
 def _take(
     work: _Work, file: File, segment: Segment | GliderwatchError, following: int, ocean: OceanCache
 ) -> None:
-    """Assess one more segment; nobody is told."""
+    """Assess one more segment; nobody is notified."""
     if isinstance(segment, GliderwatchError):
         work.problems.append((file.path, str(segment)))
         return
@@ -259,12 +259,12 @@ def _take(
     try:
         with work.new.followed_by(following):
             layers = layers_of(work.config, work.glider)
-            taken = transaction.process_file(
+            outcome = transaction.process_file(
                 work.new, file, segment, params, None, time.time(), ocean=field_, layers=layers
             )
     except Quarantine as error:
         work.problems.append((file.path or segment.id.name, str(error)))
         return
-    if taken.file.status == Status.TAKEN:
+    if outcome.file.status == Status.TAKEN:
         work.files += bool(file.path)
         work.held += not file.path

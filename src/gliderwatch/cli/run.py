@@ -103,9 +103,9 @@ def _replay(request: Request) -> None:
     with bar as progress:
         task = progress.add_task("files", total=None)
 
-        def on_file(taken: FileOutcome) -> None:
+        def on_file(outcome: FileOutcome) -> None:
             progress.advance(task)
-            for alert in taken.alerts:
+            for alert in outcome.alerts:
                 show_alert(alert, console)
 
         report = replay(request, on_total=lambda n: progress.update(task, total=n), on_file=on_file)

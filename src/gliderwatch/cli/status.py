@@ -218,7 +218,7 @@ class GliderStatus:
     ``expected`` and ``awaited``: the next surfacing, as known ``at`` a time (s). ``acks``: who has taken
     incidents on. ``irregularities`` of its files in the last 30 days. ``threads`` are what goes on and is no
     incident of dives, ``not_come`` the files that it announced in a call (its time, s) and that never came.
-    ``call`` is its last, where that is later than its last dive that ended: what it told there is news.
+    ``call`` is its last, where that is later than its last dive that ended: what it reported there is news.
     """
 
     name: str
@@ -239,12 +239,12 @@ class GliderStatus:
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing was heard for so long that the deployment counts as over."""
+        """Whether no sign of life came for so long that the deployment counts as over."""
         return self.awaited is not None and self.at - self.awaited.last_sign >= GONE
 
     @property
     def is_muted(self) -> bool:
-        """Whether nothing is told of it now, but will be later."""
+        """Whether nobody is notified of it now, but will be later."""
         return self.attention.muted_until is not None and self.at < self.attention.muted_until
 
     @property
@@ -356,7 +356,7 @@ def _news(calls: tuple[Call, ...], latest: Assessment | None) -> Call | None:
 
 
 def _call_as_json(call: Call | None) -> dict[str, Any] | None:
-    """What a glider told of itself in a call, for machines."""
+    """What a glider reported in a call, for machines."""
     if call is None or call.fix is None:
         return None
     return {

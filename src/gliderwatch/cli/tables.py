@@ -90,7 +90,7 @@ def show(table: Table, console: Console) -> None:
 def files(counts: dict[Status, int], left_out: Sequence[File], console: Console, most: int = 20) -> None:
     """What became of files: how many of each status, and why those that were not taken were not.
 
-    Files of one status and reason are told once.
+    Files of one status and reason are shown once.
     """
     console.print("files: " + (", ".join(f"{n} {status}" for status, n in counts.items()) or "none"))
     alike = defaultdict[tuple[Status, str], list[File]](list)
@@ -197,7 +197,7 @@ def _glider(g: GliderStatus) -> list[str]:
 
 
 def _next(g: GliderStatus) -> list[tuple[str, str]]:
-    """The next surfacing of a glider, or its silence, and why nothing may be told of it: style and text."""
+    """The next surfacing of a glider, or its silence, and why nobody may be notified: style and text."""
     name, call, lines = clean(g.name, 30), g.awaited, list[tuple[str, str]]()
     if g.attention.recovered:
         return [("dim", f"{name}: recovered, nothing is told of it")]

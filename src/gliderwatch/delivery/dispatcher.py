@@ -122,8 +122,8 @@ def _delivery(failure: DeliveryError) -> Delivery:
 # ----------------------------------------
 # The dispatcher: one thread takes what is due out of the outbox, one worker a channel delivers it.
 #
-# At least once: a row is marked delivered after its channel said so, and tried until then. Given up is only
-# what a channel refuses for good, and that is reported over the others. A channel that is slow or down
+# At least once: a row is marked delivered after its channel confirmed it, and tried until then. Given up is
+# only what a channel refuses for good, and that is reported over the others. A channel that is slow or down
 # delays no other. Messages of one incident go to one channel in their order: the store holds back a row
 # while an older one of the same incident and channel is undelivered.
 
@@ -153,7 +153,7 @@ class OutboxStore(Protocol):
         ...
 
     def delivered(self, row_id: int, now: float) -> None:
-        """Mark a row as delivered and commit; may be told twice."""
+        """Mark a row as delivered and commit; may be called twice."""
         ...
 
     def failed(self, row_id: int, error: str, next_try: float) -> None:

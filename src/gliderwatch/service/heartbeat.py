@@ -170,11 +170,11 @@ class Upkeep:
         if begun is not None:
             self._metrics.decode.observe(time.monotonic() - begun)
 
-    def took(self, taken: FileOutcome, seconds: float | None = None) -> None:
-        """It is known what became of a file; it took so many `seconds` to take in, if it was."""
-        self._operator.came(taken.file.glider, time.monotonic())
-        self._metrics.came(taken.file, time.time())
-        self._metrics.assessed(taken.assessments)
+    def processed(self, outcome: FileOutcome, seconds: float | None = None) -> None:
+        """A file led to an outcome; to process it took so many `seconds`, if it was decoded."""
+        self._operator.came(outcome.file.glider, time.monotonic())
+        self._metrics.came(outcome.file, time.time())
+        self._metrics.assessed(outcome.assessments)
         if seconds is not None:
             self._metrics.assess.observe(seconds)
             self._decoding.done(time.monotonic())  # what was decoded meanwhile had to wait for this loop

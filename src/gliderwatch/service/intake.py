@@ -242,7 +242,7 @@ class Intake:
         try:
             now, ocean = time.time(), self._runtime.ocean.field(glider)
             with self._store.followed_by(self._runtime.backlog.behind(glider)):
-                taken = transaction.process_file(
+                outcome = transaction.process_file(
                     self._store,
                     file,
                     segment,
@@ -258,7 +258,7 @@ class Intake:
             log.error("file cannot be assessed", path=file.path, glider=glider, exc_info=error.__cause__)
             self._record(judgement.failed(file, error))
         else:
-            self._report(taken, time.monotonic() - begun)
+            self._report(outcome, time.monotonic() - begun)
 
     def _gave_no_more(self, file: File, segment: Segment) -> bool:
         """Whether a file that was judged again, for what lies beside it, gave no more than before."""
@@ -272,7 +272,7 @@ class Intake:
         )
 
     def _record(self, file: File) -> None:
-        """Write down what became of a file that is not taken (now), if that is new."""
+        """Write down what became of a file that is not decoded (now), if that is new."""
         if self._store.file(file.path) == file:
             self._notify_if_last(file.glider)
             return
@@ -289,7 +289,7 @@ class Intake:
         before = self._store.file(file.path)
         more = len(self._settled) > 1  # one after another would assess the same dives as often
         try:
-            taken = transaction.process_log(
+            outcome = transaction.process_log(
                 self._store,
                 file,
                 dialog,
@@ -303,18 +303,18 @@ class Intake:
         except Quarantine as error:
             log.error("log cannot be assessed", path=file.path, glider=file.glider, exc_info=error.__cause__)
             failed = judgement.failed(file, error)
-            taken = transaction.record_file(self._store, failed, params, routing, time.time())
+            outcome = transaction.record_file(self._store, failed, params, routing, time.time())
         if more and file.glider:
             self._outdated.add(file.glider)
         if before is None or before.status != file.status:  # not once for each line that comes
-            self._report(taken)
+            self._report(outcome)
         else:
             self._changed(file.glider)
-            self.send(taken.alerts)
+            self.send(outcome.alerts)
 
     def _report(self, outcome: transaction.FileOutcome, seconds: float | None = None) -> None:
-        logs.taken(outcome)
-        self._upkeep.took(outcome, seconds)
+        logs.processed(outcome)
+        self._upkeep.processed(outcome, seconds)
         self._changed(outcome.file.glider)
         self.send(outcome.alerts)
         for advice in outcome.advice:
@@ -350,12 +350,12 @@ class Intake:
             self._changed(alert.glider)
 
     def notify_all(self) -> None:
-        """Say what an earlier life left unsaid of any glider."""
+        """Send the messages that were due of any glider when the daemon ended."""
         for glider in self._store.gliders():
             self._notify_if_last(glider)
 
     def notify_returned(self, monotonic: float) -> float | None:
-        """Say what is to be said of gliders that were overdue and of which no file came for a while; seconds
+        """Send what is due of gliders that were overdue and of which no file came for a while; seconds
         until the next may be due, None: there is none."""
         waiting = {g: at for g, (at, _) in self._returned.items() if not self._runtime.backlog.more(g)}
         for glider in [g for g, at in waiting.items() if at <= monotonic]:
@@ -365,11 +365,11 @@ class Intake:
         return min(waiting.values()) - monotonic if waiting else None
 
     def is_notified(self, glider: str) -> bool:
-        """Whether nothing of a glider waits to be said."""
+        """Whether no message about a glider waits for more of its files."""
         return glider not in self._returned
 
     def notify_unmuted(self, now: float) -> None:
-        """Say what there is to say of gliders whose mute has ended since the last time, by `now` (s)."""
+        """Send what is due of gliders whose mute has ended since the last time, by `now` (s)."""
         since, self._unmuted_until = self._unmuted_until, now
         attention = self._runtime.routing.attention
         ends = {glider: attention(glider).muted_until for glider in self._runtime.config.gliders}
@@ -378,7 +378,7 @@ class Intake:
             self._notify_if_last(glider)
 
     def _notify_if_last(self, glider: str) -> None:
-        """Say what is to be said of a glider without a new file."""
+        """Send the messages that are due of a glider without a new file."""
         if self._routing_if_last(glider) is not None:
             self._notify(glider)
 

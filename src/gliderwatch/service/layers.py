@@ -44,7 +44,7 @@ def wants_science(config: Config) -> bool:
     return bool(config.fields) or any(glider.layers is not None for glider in config.gliders.values())
 
 
-def take(store: Store, identity: SegmentId, layers: GliderLayers) -> None:
+def learn(store: Store, identity: SegmentId, layers: GliderLayers) -> None:
     """Learn the layers of a segment that is held; inside of a transaction.
 
     What was learnt of another sensor counts for nothing.

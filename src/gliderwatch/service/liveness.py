@@ -92,7 +92,7 @@ def _try(file: BinaryIO, kind: int) -> bool:
 
 
 # ----------------------------------------
-# What systemd is told: ready, status, reloading, still alive (sd_notify(3)).
+# Messages to systemd: ready, status, reloading, still alive (sd_notify(3)).
 #
 # The protocol is one datagram; the packages for it are unkept, or need a compiler.
 

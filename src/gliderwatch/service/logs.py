@@ -38,7 +38,7 @@ class _Patient(io.TextIOBase):
 
 
 def configure() -> None:
-    """Set up structlog and the log of the libraries, which is heard from warnings on."""
+    """Set up structlog and the log of the libraries, from warnings on."""
     is_terminal, json = sys.stderr.isatty(), structlog.processors.JSONRenderer()
     common: list[structlog.typing.Processor] = [
         structlog.contextvars.merge_contextvars,
@@ -46,8 +46,8 @@ def configure() -> None:
         structlog.processors.TimeStamper(fmt="iso", utc=True),
         structlog.processors.format_exc_info,
     ]
-    heard = logging.StreamHandler(sys.stderr)
-    heard.setFormatter(
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(
         _OneLine("%(name)s: %(message)s")
         if is_terminal
         else structlog.stdlib.ProcessorFormatter(
@@ -55,7 +55,7 @@ def configure() -> None:
             foreign_pre_chain=[structlog.stdlib.add_logger_name, *common],
         )
     )
-    logging.basicConfig(level=logging.WARNING, handlers=[heard])
+    logging.basicConfig(level=logging.WARNING, handlers=[handler])
     structlog.configure(
         processors=[*common, *([_printable, structlog.dev.ConsoleRenderer()] if is_terminal else [json])],
         wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
@@ -84,7 +84,7 @@ def _indented(line: str) -> str:
     return line[: len(line) - len(line.lstrip(" "))] + clean(line, _LONGEST)
 
 
-def taken(input_: FileOutcome) -> None:
+def processed(input_: FileOutcome) -> None:
     """What became of a file."""
     file = input_.file
     log.info(

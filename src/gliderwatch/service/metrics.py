@@ -53,7 +53,12 @@ class Metrics:
             **one,
         )
         self.queue = Gauge("queue_files", "Files at hand that are not taken yet", **one)
-        self.flags = Counter("flags", "Dives assessed, by flag; anew counts again", ["glider", "flag"], **one)
+        self.flags = Counter(
+            "flags",
+            "Dives by flag; each assessment counts",
+            ["glider", "flag"],
+            **one,
+        )
         self.incidents = Gauge("open_incidents", "Incidents that are open", ["glider"], **one)
         self.overdue = Gauge("overdue", "1 while a glider is overdue", ["glider"], **one)
         self.last_file = Gauge(

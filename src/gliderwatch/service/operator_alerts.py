@@ -158,7 +158,7 @@ def channels(config: Config, audience: Severity, key: str) -> Waits:
 
 
 def sent_messages(state: Path) -> dict[str, tuple[str, float]]:
-    """Troubles that were told and are not over: by key the id of the message and its time (s)."""
+    """Troubles that were reported and are not over: by key the id of the message and its time (s)."""
     rows = operator_messages(state, _ROOT)
     ids = [identity for identity in rows if not identity.endswith(_OVER) and identity + _OVER not in rows]
     return {i.removeprefix(_ROOT).rpartition("/")[0]: (i, rows[i]) for i in ids}
@@ -224,7 +224,7 @@ class Operator:
         return tuple(alerts.values())
 
     def is_unheard(self, config: Config) -> bool:
-        """Whether no channel delivers, so that nobody could be told of anything."""
+        """Whether no channel delivers, so that nobody could be notified of anything."""
         return bool(config.channels) and all(f"{CHANNEL}/{name}" in self._open for name in config.channels)
 
 

@@ -28,7 +28,7 @@ log = structlog.get_logger(__name__)
 LIMIT = 60.0
 """Seconds that the pages of one glider, or the one of all, may take: usually below one."""
 FLEET_EVERY, GLIDER_EVERY = 600.0, 3600.0
-"""Seconds after which a page is written anew without any news: countdowns, and where a glider drifts."""
+"""Seconds after which a page is written again without any news: countdowns, and where a glider drifts."""
 EXPORTED = 5000
 """Dives of a glider in its table and its NetCDF file at the most: two years of them."""
 _NICENESS = 10

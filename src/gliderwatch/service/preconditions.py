@@ -97,7 +97,7 @@ def _is_closed(path: Path) -> bool:
 
 
 def _content(config: Config) -> Iterator[Refusal]:
-    """What is in the state file is gliderwatch's, and of no later release. A damaged one is made anew."""
+    """What is in the state file is gliderwatch's, and of no later release. A damaged one is made again."""
     path = Path(config.state.path)
     try:
         refuse_foreign(path)

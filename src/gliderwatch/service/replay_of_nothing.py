@@ -28,8 +28,8 @@ def unassessed(store: Store, folders: Iterable[Path]) -> str | None:
     files = left_out[status]
     if not files:
         return "nothing was assessed: the files were read, but none holds a dive"
-    said = {Status.WAITING: _waiting, Status.UNKNOWN: _unknown_gliders, Status.QUARANTINED: _bad}[status]
-    return f"nothing was assessed: {said(files, folders)}"
+    explain = {Status.WAITING: _waiting, Status.UNKNOWN: _unknown_gliders, Status.QUARANTINED: _bad}[status]
+    return f"nothing was assessed: {explain(files, folders)}"
 
 
 def _waiting(files: Sequence[File], folders: Iterable[Path]) -> str:

@@ -17,7 +17,7 @@ from gliderwatch.store.state_file import Store
 
 @dataclass(frozen=True, slots=True)
 class Routing:
-    """Who is told: ``channels`` of an alert (a mapping says what they wait for), of which gliders
+    """Who is notified: ``channels`` of an alert (a mapping says what they wait for), of which gliders
     surfacing notices are wanted, how the silence of a glider is taken, and the ``limits`` of its rules of
     health."""
 
@@ -64,7 +64,7 @@ def channels(alert: Alert, config: Config) -> Waits:
 
 
 def operators(config: Config, audience: Severity) -> list[Recipient]:
-    """Who hears that the watch itself is in trouble; where there are none, all who want such messages."""
+    """Who is notified that the watch itself is in trouble; without such, all who want the message."""
     recipients = list(config.recipients.values())
     return [r for r in recipients if r.operator] or [r for r in recipients if audience >= r.min_severity]
 
@@ -91,7 +91,7 @@ def post_alert(
 ) -> None:
     """Put a message into the outbox of its channels, each for the time when it is due there.
 
-    ``open_threads`` are those that go on and that nobody has taken on. A message of a known id is left alone.
+    ``open_threads`` are open and not acknowledged. A message of a known id is left alone.
     """
 
     def standing(channel: str) -> Standing:
@@ -134,7 +134,7 @@ def post_due(
 
 
 def withdraw_answered(store: Store, glider: str, now: float, *, quiet: bool = False) -> frozenset[str]:
-    """The threads that go on and that nobody has taken on, none of a glider that is `quiet`.
+    """The threads that are open and that nobody has acknowledged, none of a glider that is `quiet`.
 
     What is held of the others until it escalates is withdrawn.
     """

@@ -24,7 +24,7 @@ from gliderwatch.store.database import refuse_foreign
 from gliderwatch.store.state_file import Store
 
 # ----------------------------------------
-# The state file cannot be used: the disk is full, or read-only. It is said, and tried again until it can.
+# The state file cannot be used: the disk is full, or read-only. It is reported, and tried again until it can.
 
 log = structlog.get_logger(__name__)
 
@@ -98,7 +98,7 @@ class StateOutage:
 
 
 # ----------------------------------------
-# Opening the state file, also when it is damaged: set aside, made anew, and the operator is told.
+# Opening the state file, also when it is damaged: set aside, made again, and the operator is notified.
 
 
 def open_state(config: Config) -> Store:
@@ -122,7 +122,7 @@ def set_aside(path: Path, reason: str) -> None:
     """Put a damaged state file out of the way. Raises StateError where it cannot be renamed."""
     aside = maintenance.set_aside(path, time.time())
     log.error(
-        "state file is damaged, set aside, made anew from the files",
+        "state file is damaged, set aside, made again from the files",
         path=str(path),
         reason=reason,
         kept=str(aside),
@@ -135,7 +135,7 @@ def _tell(aside: Path, config: Config) -> None:
 
     def report(saved: int) -> Alert:
         text = (
-            f"It was found damaged and set aside as {aside.name}. All is made anew from the files on the "
+            f"It was found damaged and set aside as {aside.name}. All is made again from the files on the "
             f"dockserver; dives of files that are not there any more are lost. {saved} messages, told or to "
             "be told, were saved from it.\nWhat to do: look after the disk.\n"
             "What to do: delete the damaged file when nobody needs it."
@@ -159,7 +159,7 @@ def _tell(aside: Path, config: Config) -> None:
 
 @contextmanager
 def setting_aside(path: Path) -> Iterator[None]:
-    """A state file that is found damaged inside is set aside; the next start makes it anew."""
+    """A state file that is found damaged inside is set aside; the next start makes it again."""
     try:
         yield
     except DamagedError as error:

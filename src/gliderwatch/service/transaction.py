@@ -28,9 +28,10 @@ from gliderwatch.navigation.clock import moved
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
 from gliderwatch.sea.ocean_field import Field
+from gliderwatch.service import fields as fields_of_sea
 from gliderwatch.service import layers as layers_of_sea
 from gliderwatch.service.call_additions import added, keep_call, next_surfacing, touched
-from gliderwatch.service.fields import FieldAdvice, FleetField, look, take
+from gliderwatch.service.fields import FieldAdvice, FleetField, look
 from gliderwatch.service.layers import GliderLayers
 from gliderwatch.service.routing import Routing, post_alerts, post_due, withdraw_answered
 from gliderwatch.slocum.calls import Dialog
@@ -39,7 +40,7 @@ from gliderwatch.store.state_file import File, Status, Store
 
 @dataclass(frozen=True, slots=True)
 class FileOutcome:
-    """What an input led to: what became of its file, the dives assessed anew, the messages made, where to
+    """What an input led to: what became of its file, the dives assessed, the messages made, where to
     look next for fields, and how deep to fly to keep on layers."""
 
     file: File
@@ -54,7 +55,7 @@ LAST_ADVICE = 86400.0
 
 
 class StoppedError(GliderwatchError):
-    """The daemon ends while an input is taken in: nothing of it is kept, the next start takes it again."""
+    """The daemon ends while an input is processed: nothing of it is kept, the next start processes it."""
 
 
 def process_file(
@@ -89,7 +90,7 @@ def process_file(
         first = _place(store, segment)
         assessments, state = _run(store, first, segment, params, stopping, ocean, layers)
         if fields:
-            take(store, fields, store.segments.kept(segment.id))
+            fields_of_sea.add(store, fields, store.segments.kept(segment.id))
         advice = look(store, fields, glider, state) if fields and routing is not None else ()
         alerts = _due_messages(store, glider, params, routing, now)
         deep = layers_of_sea.newest(store, glider) if layers is not None and routing is not None else None
@@ -99,7 +100,7 @@ def process_file(
 def record_file(
     store: Store, file: File, params: GliderParams, routing: Routing | None, now: float
 ) -> FileOutcome:
-    """Write down a file that cannot be taken (now); make the messages that earlier files of its glider
+    """Write down a file that cannot be decoded (now); make the messages that earlier files of its glider
     left.
 
     It is a sign of life all the same, if its header tells of what.
@@ -156,7 +157,7 @@ def notify_pilots(
     ocean: Field | None = None,
     layers: GliderLayers | None = None,
 ) -> tuple[Alert, ...]:
-    """Say what is to be said of a glider without any new input: after a start or a new configuration, or
+    """Make the messages that are due of a glider without any new input: after a start, a new configuration or
     many logs. Raises Quarantine as `process_log` does."""
     with store.transaction():
         _catch_up(store, glider, params, ocean, layers)
@@ -164,7 +165,7 @@ def notify_pilots(
 
 
 def tick(store: Store, glider: str, routing: Routing, others: Iterable[str], now: float) -> tuple[Alert, ...]:
-    """Say that a glider is overdue, if it is at `now` (s); `others` are watched as well."""
+    """Make the message that a glider is overdue, if it is at `now` (s); `others` are watched as well."""
     due_at = next_tick(store, glider, routing, now)
     if due_at is None or due_at > now:
         return ()
@@ -220,7 +221,7 @@ def _channels(
 
 
 def next_tick(store: Store, glider: str, routing: Routing, now: float) -> float | None:
-    """When `tick` has something to say of a glider next (s), None: never."""
+    """When `tick` makes a message about a glider next (s), None: never."""
     attention = with_mute(routing.attention(glider), store.notes.muted_until(glider))
     if attention.recovered:
         return None
@@ -252,13 +253,13 @@ def _run(
     dives: dict[float, Assessment] = {}
     for identity, following in zip_longest(todo, todo[1:]):
         if stopping():
-            raise StoppedError(f"{identity.name} was not taken in: the daemon ends")
+            raise StoppedError(f"{identity.name} was not processed: the daemon ends")
         one = fresh if fresh is not None and identity == fresh.id else store.segments.get(identity)
         one = with_call(one, added(store, one, inf if following is None else following.opened_at))
         outcome = _process(state, one, params, ocean)
         store.keep(identity, outcome)
         if layers is not None:
-            layers_of_sea.take(store, identity, layers)
+            layers_of_sea.learn(store, identity, layers)
         state = outcome.state
         dives = {t: a for t, a in dives.items() if t < outcome.since} | {
             a.t_dive: a for a in outcome.assessments

@@ -68,7 +68,7 @@ def candidates(crc: str, folders: Iterable[Path]) -> Iterator[Path]:
 
 
 def is_there(crc: str, folders: Iterable[Path]) -> bool:
-    """Whether anything has the name of a cache file. Raises `OSError` where that cannot be said."""
+    """Whether anything has the name of a cache file. Raises `OSError` where that cannot be found out."""
     return next(candidates(crc, folders), None) is not None
 
 

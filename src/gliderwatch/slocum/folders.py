@@ -204,7 +204,7 @@ def expand(patterns: Iterable[str | Path]) -> list[Path]:
 
 
 def is_folder(path: Path) -> bool:
-    """Whether a folder is there; False too where it cannot be told, as on a share that is away."""
+    """Whether a folder is there; False too where that is not known, as on a share that is away."""
     try:
         return stat.S_ISDIR(path.stat().st_mode)
     except OSError:
@@ -222,7 +222,7 @@ def find_places(roots: Sequence[str | Path], explicit: Mapping[str, Sequence[str
 def scan(places: Iterable[Place], unread: list[str]) -> Iterator[Found]:
     """All files of flight data in the places, each once, folder by folder.
 
-    What disappears meanwhile is left out; what cannot be read is told in `unread`.
+    What disappears meanwhile is left out; what cannot be read is named in `unread`.
     """
     seen: set[tuple[int, int]] = set()
     for place in places:
@@ -351,7 +351,7 @@ class Settling:
         self._passed: dict[Path, tuple[int, int]] = {}
 
     def observe(self, path: Path, size: int, mtime_ns: int, now: float) -> None:
-        """Takes note of a file as a scan or an event shows it; a change of state begins the wait anew."""
+        """Takes note of a file as a scan or an event shows it; a change of state begins the wait again."""
         state = (size, mtime_ns)
         entry = self._waiting.get(path)
         if self._passed.get(path) == state or (entry and (entry.size, entry.mtime_ns) == state):

@@ -238,7 +238,7 @@ def _tags(data: bytes) -> tuple[dict[str, str], int]:
 def _check_version(text: str) -> None:
     """Raises Quarantine for an encoding version that cannot be read, with the software it belongs to."""
     if not re.fullmatch(_PATTERNS["encoding_ver"], text, re.ASCII) or int(text) == _ENCODING:
-        return  # what is no number is damage, told later
+        return  # what is no number is damage, reported later
     version = str(int(text))
     if version in _EARLIER:
         raise Quarantine(

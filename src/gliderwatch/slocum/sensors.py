@@ -318,7 +318,7 @@ def declination_of(quantities: Mapping[str, Series]) -> tuple[float | None, str]
     """Declination (rad, east positive) that the glider reports, else the model's at its first position."""
     if "magnetic_variation" in quantities:
         variation = quantities["magnetic_variation"].v
-        variation = variation[variation != 0.0]  # zero until the receiver has told
+        variation = variation[variation != 0.0]  # zero until the receiver has reported it
         if len(variation):
             return -median(variation.tolist()), "glider"
     for name in ("fix", "dr"):

@@ -220,7 +220,7 @@ class Watcher:
         return reads and all(emitter.is_alive() for emitter in emitters)
 
     def restart(self) -> None:
-        """Begins anew with a new observer."""
+        """Begins again with a new observer."""
         self.stop()
         self.start()
 

@@ -38,7 +38,7 @@ PART = ".part"
 def backup(source: Path, target: Path) -> int:
     """Copy the state file `source` to `target`; its size (bytes).
 
-    https://sqlite.org/backup.html: all in one step, so that a writer neither waits nor makes it begin anew.
+    https://sqlite.org/backup.html: all in one step, so that a writer neither waits nor makes it begin again.
     Raises GliderwatchError where there is something at `target` already, where it cannot be written, or where
     the copy is not whole; then nothing is left there.
     """
@@ -126,7 +126,7 @@ def _sync(path: Path) -> None:
 
 
 # ----------------------------------------
-# Putting what was assessed anew of one glider in place of what a state file holds of it.
+# Putting what was assessed again of one glider in place of what a state file holds of it.
 
 _TABLES = ("segments", "assessments", "incidents", "expected", "layers")
 
@@ -172,7 +172,7 @@ def _insert(db: sqlite3.Connection, table: str, rows: list[sqlite3.Row]) -> None
         db.execute(f"INSERT INTO {table} VALUES ({', '.join('?' * len(row))})", tuple(row))
 
 
-def replace(db: sqlite3.Connection, fresh: Path, glider: str, said: NotificationState) -> None:
+def replace(db: sqlite3.Connection, fresh: Path, glider: str, notified: NotificationState) -> None:
     """Put what the state file `fresh` holds of a glider in place of what is held, all or nothing.
 
     The ledger learns of the files that were taken; messages, signs of life and notes stay.
@@ -187,7 +187,7 @@ def replace(db: sqlite3.Connection, fresh: Path, glider: str, said: Notification
             "INSERT OR REPLACE INTO main.files SELECT * FROM fresh.files "
             "WHERE path != '' AND status IN ('taken', 'duplicate')"
         )
-        db.execute("INSERT OR REPLACE INTO main.said VALUES (?, ?)", (glider, codec.plain_encode(said)))
+        db.execute("INSERT OR REPLACE INTO main.said VALUES (?, ?)", (glider, codec.plain_encode(notified)))
         db.execute("COMMIT")
     except BaseException:
         if db.in_transaction:
@@ -197,9 +197,9 @@ def replace(db: sqlite3.Connection, fresh: Path, glider: str, said: Notification
 
 
 # ----------------------------------------
-# A state file that is damaged: found at start, set aside, and what people were told saved from it.
+# A state file that is damaged: found at start, set aside, and what people were notified of saved from it.
 #
-# All else is made anew from the files on the dockserver.
+# All else is made again from the files on the dockserver.
 
 LOOK = 1.0
 """Seconds that the check of a large file may take at each start; the rest shows itself when it is read."""
@@ -269,9 +269,9 @@ def asides(path: Path) -> list[Path]:
 
 
 def restore(path: Path, aside: Path, report: Callable[[int], Alert], channels: Iterable[str]) -> Alert | None:
-    """Save from a file that was set aside what people were told, and what waits to be told.
+    """Save from a file that was set aside what people were notified of, and what waits to be sent.
 
-    So nothing is told twice after all is made anew, and no message is lost. `report` makes the message about
+    No message comes twice after all is made again, and none is lost. `report` makes the message about
     it from the number of messages saved; None: it was made before. All in one transaction. Raises StateError.
     """
     with guarded(path), closing(connect(path)) as db:
@@ -285,7 +285,7 @@ def restore(path: Path, aside: Path, report: Callable[[int], Alert], channels: I
 
 
 def _save(aside: Path, db: sqlite3.Connection) -> int:
-    """Copy messages, what was said, muted and acknowledged, as far as they can be read; how many messages."""
+    """Copy messages, what was notified, muted and acknowledged, as far as they can be read; how many."""
     kept: set[str] = set()
     try:
         look = sqlite3.connect(f"{aside.absolute().as_uri()}?mode=ro", uri=True)

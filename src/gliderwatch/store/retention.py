@@ -26,7 +26,7 @@ AT_ONCE = 500
 _PAGES = 1000
 """Free pages given back in one transaction."""
 _LARGEST = 256e6
-"""Bytes in use up to which a state file is written anew to make it smaller: that takes a second or two, in
+"""Bytes in use up to which a state file is written again to make it smaller: that takes a second or two, in
 which nothing else is written."""
 
 Transaction = Callable[[], AbstractContextManager[None]]
@@ -50,11 +50,11 @@ def remove(
     """Remove what is older than `cut` (s): each step is one small transaction, and gives its rows removed.
 
     Kept is what open incidents, and threads of messages that have not ended, are about; what waits to be
-    delivered; messages to the operator; files that are still there. Raises StateError; then begin anew later.
+    delivered; messages to the operator; files that are still there. Raises StateError: begin again later.
     """
     for glider in gliders:
-        incidents, said = _incidents(db, glider), _said(db, glider)
-        before = min(kept_since(incidents, said.threads, cut), _came_since(db, glider, cut))
+        incidents, notified = _incidents(db, glider), _notified(db, glider)
+        before = min(kept_since(incidents, notified.threads, cut), _came_since(db, glider, cut))
         yield from _segments(db, transaction, glider, before)
         yield from _results(db, transaction, glider)
     yield from _files(db, transaction, cut)
@@ -76,24 +76,24 @@ def _incidents(db: sqlite3.Connection, glider: str) -> list[Incident]:
     return [codec.plain_decode(row[0], Incident) for row in rows]
 
 
-def _said(db: sqlite3.Connection, glider: str) -> NotificationState:
+def _notified(db: sqlite3.Connection, glider: str) -> NotificationState:
     row = db.execute("SELECT data FROM said WHERE glider = ?", (glider,)).fetchone()
     return codec.plain_decode(row[0], NotificationState) if row is not None else NotificationState()
 
 
 def _forget_incidents(db: sqlite3.Connection, glider: str, cut: float) -> tuple[float, set[str]]:
-    """Remove incidents that are over, with what was said of them: one that is gone, but told, would be
+    """Remove incidents that are over, and what was notified of them: one that is gone, but notified, would be
     withdrawn. The time (s) from which on all is kept for those that stay, and the threads that stay."""
-    incidents, said = _incidents(db, glider), _said(db, glider)
-    floor = kept_since(incidents, said.threads, cut)
+    incidents, notified = _incidents(db, glider), _notified(db, glider)
+    floor = kept_since(incidents, notified.threads, cut)
     gone = [(i.id,) for i in incidents if is_removable(i, floor)]
     db.executemany("DELETE FROM incidents WHERE id = ?", gone)
     db.executemany("DELETE FROM acks WHERE incident = ?", gone)
-    threads = tuple(t for t in said.threads if ended_at(t) >= floor)
-    if threads != said.threads:
-        text = codec.plain_encode(replace(said, threads=threads))
+    threads = tuple(t for t in notified.threads if ended_at(t) >= floor)
+    if threads != notified.threads:
+        text = codec.plain_encode(replace(notified, threads=threads))
         db.execute("UPDATE said SET data = ? WHERE glider = ?", (text, glider))
-    return floor, {t.id for t in threads} | {s.id for s in said.silences}
+    return floor, {t.id for t in threads} | {s.id for s in notified.silences}
 
 
 # -------------------------------------------------------------------- segments
@@ -108,7 +108,7 @@ def _segments(db: sqlite3.Connection, transaction: Transaction, glider: str, bef
     for opened_at, name in db.execute(sql, (glider, before)).fetchall():
         with transaction():
             key = (glider, name)
-            marked = db.execute(  # it may have been put anew since it was found
+            marked = db.execute(  # it may have been put back since it was found
                 "UPDATE segments SET milestone = ? WHERE glider = ? AND name = ? AND checkpoint IS NOT NULL "
                 "AND opened_at = ?",
                 (FIRST, *key, opened_at),

@@ -45,7 +45,7 @@ class Fields:
         self._newest.clear()
 
     def begin(self, field: str, key: str) -> bool:
-        """Begin a field anew where `key`, that of its settings, is another than before; whether it was."""
+        """Begin a field again where `key`, that of its settings, is another than before; whether it was."""
         row = self._db.execute("SELECT key FROM field_settings WHERE field = ?", (field,)).fetchone()
         if row is not None and row[0] == key:
             return False
@@ -208,7 +208,7 @@ class LayerRows:
         return next(iter(values(self._db, sql, key, Layered)), None)
 
     def keep(self, identity: SegmentId, found: Layered | None) -> None:
-        """Keep what is known after a segment, in place of what was kept of it; None: it told nothing."""
+        """Keep what is known after a segment, in place of what was kept of it; None: nothing."""
         key = (identity.glider, identity.opened_at, identity.name)
         self._db.execute("DELETE FROM layers WHERE glider = ? AND opened_at = ? AND segment = ?", key)
         if found is not None:

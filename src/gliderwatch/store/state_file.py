@@ -27,17 +27,6 @@ from gliderwatch.store.results import Annotations, Calls, GliderFacts
 from gliderwatch.store.sea import Fields, LayerRows
 from gliderwatch.store.segments import RECENT, Segments
 
-# ----------------------------------------
-# What is known of one glider, as the rules ask for it.
-
-
-# ----------------------------------------
-# What people told gliderwatch by command: mutes, and acknowledgements of incidents.
-
-
-# ----------------------------------------
-# The state of the daemon or of a replay: ledger, segments, checkpoints, assessments, incidents, messages.
-
 __all__ = ["File", "GliderFacts", "Status", "Store", "Undelivered"]
 
 
@@ -98,10 +87,10 @@ class Store:
 
     @contextmanager
     def followed_by(self, files: int) -> Iterator[None]:
-        """Inside, inputs of one glider are taken of which so many more files are at hand.
+        """Inside, inputs of one glider are processed of which so many more files are at hand.
 
-        Then nobody is told anything, and a power cut may take the last of them back, whole: their files are
-        there to be taken again. What is told, or is the last, is on the disk when its transaction ends.
+        Then no message is made, and a power cut may undo the last of them, each as a whole: their files are
+        there to be processed again. The last one, and all messages, are on the disk when a transaction ends.
         """
         self.segments.following = files
         if files:
@@ -255,7 +244,7 @@ class Store:
     # ---------------------------------------------------------------- messages
 
     def notified(self, glider: str) -> NotificationState:
-        """What people have been told of a glider."""
+        """What people were notified of about a glider."""
         row = self._db.execute("SELECT data FROM said WHERE glider = ?", (glider,)).fetchone()
         return codec.plain_decode(row[0], NotificationState) if row is not None else NotificationState()
 

@@ -73,7 +73,7 @@ def quick_check(state: Path) -> str:
 def failing(state: Path, now: float) -> dict[str, Failing]:
     """Channels that failed to take a message that still waits, or that refused one for good in the day before
     `now` (s) and have delivered none since. What is held does not wait before it is due, and a message that
-    some of a channel's addresses took has been told: the report of the refusal names the others."""
+    some of a channel's addresses took counts as notified: the report of the refusal names the others."""
     with reading(state) as db:
         since, how = f"max(a.made_at, {released(db)})", delivery(db)
         sql = (
