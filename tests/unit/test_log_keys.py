@@ -28,6 +28,7 @@ OF_THE_SERVICE = {
     "heartbeat is late: the one before has not come back",
     "heartbeat not given",  # its URL is a secret
     "inotify lost events, all folders are watched again",
+    "map file cannot be used",  # the reason names it
     "metrics are not served",
     "metrics are served",
     "observer died, started again",
