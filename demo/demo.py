@@ -1,7 +1,8 @@
 """The main job in a minute: gliders surface, a remora takes hold of one, another aborts; the mails arrive.
 
 Everything is real but the sea: the files are genuine Dinkum files, the daemon is the installed command,
-the mail goes through an SMTP server on this machine. Run by `make demo`; leaves nothing behind.
+the mail goes through an SMTP server on this machine. Run by `make demo`; leaves its pages, and shows them
+where there is a display.
 """
 
 from __future__ import annotations
@@ -9,12 +10,14 @@ from __future__ import annotations
 import email.policy
 import json
 import os
+import shutil
 import signal
 import socket
 import subprocess
 import sys
 import tempfile
 import time
+import webbrowser
 from email.message import Message
 from pathlib import Path
 from typing import Any
@@ -45,12 +48,16 @@ dockserver:
 state: {{path: {folder}/state.sqlite}}
 defaults:
   normal_speed: {{min: 0.20, max: 0.40}}
+  overdue_hours: 96  # three days pass in seconds
 gliders: {{sim-01: , sim-02: , sim-03: }}
 channels:
   mail: {{url: "mailto://127.0.0.1:{port}?from=gliderwatch@dockserver.local&to=pilot@ship.local"}}
 recipients:
   pilot: {{channels: [mail]}}
+pages: {{folder: {pages}}}
 """
+PAGES = Path("build/demo-pages")
+"""What is left of the demo: its pages."""
 
 
 class Mailbox:
@@ -85,7 +92,11 @@ def free_port() -> int:
 
 def play(dockserver: Path, console: Console) -> None:
     """Let a simulated fleet send its files as time passes, and show them as they come."""
-    command = [GLIDERWATCH, "simulate", dockserver, *FLEET, "--live", "--speedup", str(SPEEDUP)]
+    began = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(time.time() - 3 * DAY))  # its last file is of now
+    scenario = dockserver / "scenario.yml"
+    scenario.write_text(f"about: A demo.\nstart: {began}\nsurface_segments: true\n")
+    command = [GLIDERWATCH, "simulate", dockserver, "--scenario", scenario, *FLEET]
+    command += ["--live", "--speedup", str(SPEEDUP)]
     fleet = subprocess.Popen(
         command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
     )
@@ -146,6 +157,14 @@ def wait_for_status(config: Path) -> None:
         time.sleep(0.2)
 
 
+def show(console: Console) -> None:
+    """Say where the pages lie, and show them where there is a display."""
+    page = (PAGES / "index.html").absolute()
+    console.print(f"its page, with one a glider: {page}", soft_wrap=True, highlight=False)
+    if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
+        webbrowser.open(page.as_uri())
+
+
 def main() -> int:
     """Run the demo; 0 when the alert arrived."""
     console = Console(width=80)
@@ -156,9 +175,10 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="gliderwatch-demo-") as name:
         folder = Path(name)
         config = folder / "gliderwatch.yml"
-        config.write_text(CONFIGURATION.format(folder=folder, port=port))
+        config.write_text(CONFIGURATION.format(folder=folder, port=port, pages=PAGES.absolute()))
         for part in ("gliders", "cache"):
             (folder / "dockserver" / part).mkdir(parents=True)
+        shutil.rmtree(PAGES, ignore_errors=True)
         console.rule("a dockserver, three gliders, one daemon")
         if gliderwatch("check", "-c", config):
             return 1
@@ -176,6 +196,7 @@ def main() -> int:
                 time.sleep(0.1)
             console.rule("gliderwatch status")
             gliderwatch("status", "-c", config)
+            gliderwatch("pages", "-c", config, quiet=True)  # all as of now, whatever waits to be written
         finally:
             daemon.send_signal(signal.SIGTERM)
             daemon.wait(10)
@@ -187,6 +208,7 @@ def main() -> int:
         f"mails about {HURT}: {len(arrived)}; about {WELL}, which is well: {len(false)}; "
         f"about the abort of {ABORTING}: {len(aborted)}"
     )
+    show(console)
     return 0 if arrived and not false and len(aborted) == 1 else 1
 
 

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import signal
-import socket
-import subprocess
 from pathlib import Path
 
 import httpx
 
 from acceptance.angus import FILES, put, taken
-from acceptance.support import GLIDERWATCH, Daemon, Site, command, mail_server, remora, until
-from gliderwatch.simulate.delivery import arrivals
+from acceptance.support import Daemon, Site, command, until
 from gliderwatch.store.state_file import Store
 
 
@@ -103,43 +99,6 @@ def test_what_is_known_is_exported_by_command(site: Site, tmp_path: Path) -> Non
     assert told.stderr.startswith("nothing is known of a glider nobody; known are: angus")
     assert command("where", "angus", "--ais", "992441234", *state).stdout.startswith("!AIVDM,1,1,")
     assert command("where", "--ais", "992441234", *state).returncode == 2
-
-
-def test_the_link_of_a_mail_stops_the_escalation(tmp_path: Path) -> None:
-    mission, site = remora(2.2, onset=1.2), Site(tmp_path)
-    site.caches(mission)
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    url = f"http://127.0.0.1:{port}"
-    with mail_server() as pilot, mail_server() as chief:
-        site.configure("bruce")
-        document = json.loads(site.config.read_text())
-        document["channels"] = {"duty": {"url": pilot.url}, "chief": {"url": chief.url}}
-        document["recipients"] = {
-            "pilot": {"channels": ["duty"]},
-            "late": {"channels": ["chief"], "unacknowledged_minutes": 60},
-        }
-        document["web"] = {"port": port, "public_url": url}
-        site.config.write_text(json.dumps(document))
-        with Daemon(site):
-            command_line = [GLIDERWATCH, "web", "-c", site.config]
-            with subprocess.Popen(command_line, stderr=subprocess.DEVNULL) as served:
-                for file in arrivals(mission):
-                    site.put("bruce", file.name, file.data)
-                until(lambda: pilot.mails, "the pilot is told")
-                until(lambda: answers(url), "the pages are served")
-                found = re.search(rf"{url}/ack/\S+", pilot.mails[0].text)
-                assert found is not None, pilot.mails[0].text
-                (held,) = site.status()["held"]
-                assert held["unless_acknowledged"]
-                assert '<form method="post">' in httpx.get(found[0]).text  # as a scanner of mail does
-                assert len(site.status()["held"]) == 1
-                assert "taken on by Ann (duty)" in httpx.post(found[0], data={"by": "Ann"}).text
-                assert site.status()["held"] == []
-                assert "gliderwatch does NOT RUN" not in httpx.get(f"{url}/bruce.html", timeout=60).text
-                served.terminate()
-    assert not chief.mails
 
 
 def answers(url: str) -> bool:

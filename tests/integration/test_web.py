@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import re
 import stat
 import threading
@@ -16,6 +17,7 @@ import pytest
 from itsdangerous import URLSafeTimedSerializer
 from starlette.testclient import TestClient
 
+from gliderwatch.cli.manage import mute_glider
 from gliderwatch.cli.status import acknowledge_incident
 from gliderwatch.config import Config, load
 from gliderwatch.delivery import links
@@ -71,7 +73,10 @@ def client(config: Config) -> Iterator[TestClient]:
         entry, _ = acknowledge_incident(config, identity, by, "", now)
         return f"{entry.incident.id}: taken on by {by}."
 
-    with TestClient(app.application(config, take_on), base_url="http://127.0.0.1:8463") as client:
+    def mute(glider: str, end: float, now: float) -> str:
+        return "; ".join(mute_glider(config, glider, end, now))
+
+    with TestClient(app.application(config, take_on, mute), base_url="http://127.0.0.1:8463") as client:
         yield client
 
 
@@ -173,6 +178,51 @@ def test_a_forged_foreign_or_expired_link_does_nothing(
     assert "there is no incident electa/anomaly/2" in gone.text
     hostile = client.get(link(config, HOSTILE, HOSTILE))
     assert "<script>alert" not in hostile.text
+
+
+def test_a_glider_is_muted_by_the_link_of_its_message(client: TestClient, config: Config) -> None:
+    path = link(config, "electa/overdue/1")
+    page = client.get(path).text
+    assert "Mute electa" in page and "Take on" not in page
+    assert "electa: muted until" in client.post(path, data={"what": "mute", "hours": "12"}).text
+    store = Store.reading(Path(config.state.path))
+    until = store.notes.muted_until("electa")
+    store.close()
+    assert until == pytest.approx(time.time() + 12 * 3600, abs=60)
+    assert "muted until" in client.post(path, data={"what": "mute", "hours": "1e9"}).text  # 3 hours
+    nobody = client.post(link(config, "nobody/overdue/1"), data={"what": "mute"})
+    assert nobody.status_code == 409
+
+
+def test_the_pages_lead_to_what_they_show(client: TestClient, config: Config) -> None:
+    """Whoever reads the live pages can take on and mute, by links that no other page can make."""
+    page = client.get("/electa.html").text
+    paths = re.findall(r'href="(ack/[^"]+)"', page)
+    assert len(paths) == 2  # the incident, the glider
+    assert "Take on electa/anomaly/1?" in client.get(f"/{paths[0]}").text
+    assert "taken on by Ann (who reads the pages)" in client.post(f"/{paths[0]}", data={"by": "Ann"}).text
+    assert "muted until" in client.post(f"/{paths[1]}", data={"what": "mute", "hours": "3"}).text
+
+
+def test_the_plots_to_explore_are_all_from_here(client: TestClient) -> None:
+    page = client.get("/explore/electa.html")
+    assert re.findall(r'(?:src|data-from)="([^"]*)"', page.text) == [
+        "bokeh.min.js",
+        "explore.js",
+        "electa.json",
+    ]
+    policy = page.headers["content-security-policy"]
+    assert "script-src 'self';" in policy and "unsafe-eval" not in policy
+    assert "http" not in page.text.replace("http-equiv", "").partition("<body>")[2]
+    drawn = json.loads(client.get("/explore/electa.json").content)
+    assert drawn["target_id"] == "plots"
+    text = json.dumps(drawn)
+    assert text.count('"Range1d"') == 1  # one axis of time
+    for words in ("speed (m/s)", "Roll", "UTC"):
+        assert words in text
+    assert len(client.get("/explore/bokeh.min.js").content) > 1_000_000
+    for path in ("nobody.html", "nobody.json", "electa.txt", "bokeh.js", "../state.sqlite"):
+        assert client.get(f"/explore/{path}").status_code == 404, path
 
 
 def test_the_key_is_for_its_user_alone_and_made_once(tmp_path: Path) -> None:
@@ -277,7 +327,11 @@ def test_a_message_of_an_incident_ends_with_links(client: TestClient, config: Co
         (Kind.ANOMALY, "electa/anomaly/1", "electa", ["Take it on", "Page"]),
         (Kind.REMINDER, "electa/false_alarm/1", "electa", ["Take it on", "Page"]),
         (Kind.ALL_CLEAR, "electa/anomaly/1", "electa", ["Page"]),
-        (Kind.OVERDUE, "electa/overdue/1", "electa", ["Page"]),
+        (Kind.OVERDUE, "electa/overdue/1", "electa", ["Mute it", "Page"]),
+        (Kind.REMINDER, "electa/abort/1", "electa", ["Take it on", "Page"]),
+        (Kind.HEALTH, "electa/health/leak/1", "electa", ["Take it on", "Page"]),
+        (Kind.CALL, "electa/call/1", "electa", ["Take it on", "Page"]),
+        (Kind.SURFACING, "", "electa", ["Page"]),
         (Kind.OPERATOR, "", "", []),
     ],
 )

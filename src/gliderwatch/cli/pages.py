@@ -30,6 +30,7 @@ def pages(config_path: Path | None, state: Path | None, out: Path | None, at: st
     from gliderwatch.config.check import check_maps
     from gliderwatch.figures.coast import world
     from gliderwatch.figures.map_files import land_or_world
+    from gliderwatch.pages.reading import names_of
     from gliderwatch.params import Attention
     from gliderwatch.service import page_writer
 
@@ -44,14 +45,13 @@ def pages(config_path: Path | None, state: Path | None, out: Path | None, at: st
         if reason:
             raise ConfigError("\n".join(map(str, check_maps(config, config_path or DEFAULT))) or reason)
     with looking(config, state, at) as (store, now):
-        known = store.gliders()
-        names = {*known, *(config.gliders if config is not None and state is None else ())}
+        names = names_of(store, config.gliders if config is not None and state is None else ())
         attention = {n: config.attention(n) if config is not None else Attention() for n in names}
         batteries = {n: page_writer.battery_limits(config, n) for n in names}
         page_writer.write_fleet(store, folder, attention, batteries, now, land)
-        for name in known:
+        for name in names:
             page_writer.write_glider(store, folder, name, attention[name], batteries[name], now, land)
-    click.echo(f"{folder / 'index.html'}: {len(known)} glider{'' if len(known) == 1 else 's'}")
+    click.echo(f"{folder / 'index.html'}: {len(names)} glider{'' if len(names) == 1 else 's'}")
 
 
 @click.command(epilog=example("gliderwatch web", "gliderwatch web --link electa/anomaly/1667639 --for Ann"))
@@ -86,10 +86,15 @@ def web(config_path: Path, link: str | None, recipient: str | None) -> None:
         entry, is_new = acknowledge_incident(config, incident, by, "", now)
         return f"{entry.incident.id}: {'taken on' if is_new else 'was taken on already'} by {by}."
 
+    def mute(glider: str, end: float, now: float) -> str:
+        from gliderwatch.cli.manage import mute_glider
+
+        return "; ".join(mute_glider(config, glider, end, now))
+
     sys.setswitchinterval(0.0005)  # who draws must not hold up who answers
     click.echo(f"http://{config.web.address}:{config.web.port}/", err=True)
     uvicorn.run(
-        app.application(config, acknowledge),
+        app.application(config, acknowledge, mute),
         host=str(config.web.address),
         port=config.web.port,
         log_level="warning",

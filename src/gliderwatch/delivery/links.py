@@ -1,4 +1,4 @@
-"""Links in messages: to the page of the glider, and to acknowledge its incident from a phone.
+"""Links in messages: to the page of the glider, and to acknowledge its incident or mute it from a phone.
 
 Those are signed for the incident and for who gets the message, and hold for a time.
 """
@@ -22,7 +22,11 @@ from gliderwatch.model import Alert, Kind
 # itsdangerous is of the extra `web`: it is loaded where a link is made or opened.
 
 _SALT = "gliderwatch.acknowledge"
-_ENDED = {Kind.ALL_CLEAR, Kind.CORRECTION}
+_ENDED = {Kind.ALL_CLEAR, Kind.CORRECTION, Kind.ACKNOWLEDGED}
+TAKEN_ON = (Kind.ANOMALY, Kind.FALSE_ALARM, Kind.ABORT, Kind.HEALTH, Kind.CALL)
+"""Kinds of what can be acknowledged."""
+MUTED = (Kind.OVERDUE, Kind.UNKNOWN, Kind.NEIGHBOURS)
+"""Kinds of which there is nothing to acknowledge: the glider is muted instead."""
 
 
 class LinkError(GliderwatchError):
@@ -80,6 +84,19 @@ def opened(key: str, token: str, seconds: float) -> tuple[str, str]:
     return str(incident), str(recipient)
 
 
+def can_be_taken_on(incident: str) -> bool:
+    """Whether what an id stands for can be acknowledged.
+
+    >>> can_be_taken_on("electa/anomaly/1667639520"), can_be_taken_on("electa/overdue/1667639520")
+    (True, False)
+    """
+    return _is_of(incident, TAKEN_ON)
+
+
+def _is_of(incident: str, kinds: tuple[Kind, ...]) -> bool:
+    return incident.partition("/")[2].partition("/")[0] in {str(kind) for kind in kinds}
+
+
 @dataclass(frozen=True, slots=True)
 class Linked:
     """A channel whose messages end with links: ``public`` is the URL of the pages, ``key`` that of the links,
@@ -103,10 +120,14 @@ class Linked:
         page = f"{self.public}/{quote(alert.glider)}.html"
         found = (("Page", page),) if alert.glider else ()
         incident = alert.incident.rstrip("+")
-        kinds = tuple(f"{alert.glider}/{kind}/" for kind in (Kind.ANOMALY, Kind.FALSE_ALARM))
-        if alert.kind in _ENDED or not incident.startswith(kinds):
+        label = ""
+        if alert.kind not in _ENDED:
+            label = (
+                "Take it on" if can_be_taken_on(incident) else "Mute it" if _is_of(incident, MUTED) else ""
+            )
+        if not label:
             return found
-        return (("Take it on", f"{self.public}/ack/{token(self.key, incident, self.recipient)}"), *found)
+        return ((label, f"{self.public}/ack/{token(self.key, incident, self.recipient)}"), *found)
 
 
 def linked(channels: dict[str, Sender], public: str, state: Path) -> dict[str, Sender]:

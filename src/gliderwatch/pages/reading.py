@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -115,6 +115,11 @@ def read_section(store: Store, name: str, segments: int) -> tuple[Section, tuple
     held = [(casts_of(store.segments.get(identity), sensor), one.advice) for identity, one in rows]
     held = [(casts, advice) for casts, advice in held if casts and advice.sensor == sensor]
     return section([casts for casts, _ in held]), tuple(advice for _, advice in held)
+
+
+def names_of(store: Store, configured: Iterable[str] = ()) -> list[str]:
+    """The gliders that have a page: those that are configured, sent a file, or called."""
+    return sorted({*configured, *store.gliders(), *filter(None, store.callers())})
 
 
 def last_news(store: Store) -> float | None:

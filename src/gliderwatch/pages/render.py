@@ -68,14 +68,15 @@ def file_of(glider: str, kind: str = "", ending: str = "html") -> str:
     return f"{'glider-' if name in {'index', 'gliders'} else ''}{name}{kind}.{ending}"
 
 
-def _href(file: str) -> str:
+def href(file: str) -> str:
+    """The address of a file beside a page."""
     return file.replace("%", "%25")
 
 
 def fleet_page(views: tuple[GliderView, ...], frame: Frame, land: Land) -> str:
     """The page of all gliders, the worst first."""
     ranked = worst_first(views)
-    links = {view.name: _href(file_of(view.name)) for view, _ in ranked}
+    links = {view.name: href(file_of(view.name)) for view, _ in ranked}
     cards = [
         {
             "name": clean(v.name, 40),
@@ -114,8 +115,8 @@ def glider_page(view: GliderView, frame: Frame, land: Land, take_on: Mapping[str
         name=clean(view.name, 40),
         verdict=found,
         since=facts.since(view),
-        page=_href(file_of(view.name)),
-        sheet=_href(file_of(view.name, "-sheet")),
+        page=href(file_of(view.name)),
+        sheet=href(file_of(view.name, "-sheet")),
         facts=facts.of_glider(view),
         message=facts.actions(view),
         messages=[facts.message_of(alert) for alert in view.alerts[:MESSAGES]],
@@ -144,7 +145,7 @@ def sheet_page(view: GliderView, frame: Frame, land: Land) -> str:
         name=clean(view.name, 40),
         verdict=found,
         since=facts.since(view),
-        page=_href(file_of(view.name)),
+        page=href(file_of(view.name)),
         facts=facts.of_glider(view),
         message=facts.actions(view),
         day=_day(some),
@@ -155,9 +156,19 @@ def sheet_page(view: GliderView, frame: Frame, land: Land) -> str:
     )
 
 
-def ack_page(frame: Frame, incident: str, recipient: str, told: str) -> str:
-    """The page of a link that acknowledges: a button, or what was `told`."""
-    return _render("ack.html", frame, incident=incident, recipient=recipient, told=told)
+def ack_page(frame: Frame, incident: str, recipient: str, answer: str, *, is_open: bool = True) -> str:
+    """The page of a link that acknowledges or mutes: buttons, or the `answer` to one; only the latter where
+    the incident is none that can be taken on (`is_open`)."""
+    glider = incident.partition("/")[0]
+    values = {"incident": incident, "glider": glider, "recipient": recipient, "answer": answer}
+    return _render("ack.html", frame, **values, is_open=is_open)
+
+
+def explore_page(name: str, data: str, now: float) -> str:
+    """The page of the plots of a glider to explore, whose values are at `data`; as of `now` (s)."""
+    page, style = href(file_of(name)), Markup(_style())
+    template = _environment().get_template("explore.html")
+    return template.render(name=clean(name, 40), page=page, data=data, now=now, style=style)
 
 
 def _day(some: Sequence[Assessment]) -> str:

@@ -163,7 +163,7 @@ class PageWriter:
         if config is None or config.pages.folder is None or (self._job is not None and not self._job.done()):
             return
         names = sorted({*config.gliders, *gliders})
-        for name, every in (("", FLEET_EVERY), *((glider, GLIDER_EVERY) for glider in gliders)):
+        for name, every in (("", FLEET_EVERY), *((glider, GLIDER_EVERY) for glider in names)):
             if monotonic - self._written.get(name, float("-inf")) >= every:
                 self._waiting.setdefault(name)
         if not self._waiting:
@@ -171,7 +171,7 @@ class PageWriter:
         name = "" if "" in self._waiting else next(iter(self._waiting))
         del self._waiting[name]
         self._written[name] = monotonic
-        if not name or name in gliders:
+        if not name or name in names:
             some = [name] if name else names
             attention = {each: config.attention(each) for each in some}
             batteries = {each: battery_limits(config, each) for each in some}

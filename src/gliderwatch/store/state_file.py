@@ -21,7 +21,7 @@ from gliderwatch.navigation.clock import SAME_OPENING, ClockStep
 from gliderwatch.pipeline import Outcome
 from gliderwatch.store import codec, outbox, retention, segments
 from gliderwatch.store.codec import File, Status, Undelivered, file_of, values
-from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, read_only
+from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, has_table, read_only
 from gliderwatch.store.health import HealthRows
 from gliderwatch.store.results import Annotations, Calls, GliderFacts
 from gliderwatch.store.sea import Fields, LayerRows
@@ -231,6 +231,12 @@ class Store:
             "WHERE g.name IS NOT NULL) SELECT name FROM g WHERE name IS NOT NULL ORDER BY name"
         )
         return [row[0] for row in self._db.execute(sql)]
+
+    def callers(self) -> list[str]:
+        """The gliders of which there is the log of a call, also of those without a segment."""
+        if not has_table(self._db, "calls"):
+            return []  # a state file of an earlier release, which may be looked at
+        return [row[0] for row in self._db.execute("SELECT DISTINCT glider FROM calls ORDER BY glider")]
 
     def extent(self, glider: str) -> tuple[int, int]:
         """How many segments and how many dives of a glider are known."""

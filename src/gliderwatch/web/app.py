@@ -31,17 +31,24 @@ from gliderwatch.messages.formatting import clean
 from gliderwatch.messages.guide import PAGE
 from gliderwatch.pages import render
 from gliderwatch.pages.guide import guide_page
-from gliderwatch.pages.reading import read_fleet, read_glider
+from gliderwatch.pages.reading import names_of, read_fleet, read_glider
 from gliderwatch.pages.render import Frame
 from gliderwatch.pages.view import GliderView, worst_first
 from gliderwatch.service.liveness import STALE, is_held, seconds_silent
 from gliderwatch.service.page_writer import battery_limits
 from gliderwatch.store.state_file import Store
 from gliderwatch.web import api
+from gliderwatch.web import explore as explorer
 from gliderwatch.web.cache import PageCache, stamp_of
 
 Acknowledge = Callable[[str, str, float], str]
-"""Takes an incident on: its id, who, when (s); what to tell in a sentence. Raises GliderwatchError."""
+"""Takes an incident on: its id, who, when (s); the answer in a sentence. Raises GliderwatchError."""
+Mute = Callable[[str, float, float], str]
+"""Mutes a glider until a time, at a time (s); the answer in a sentence. Raises GliderwatchError."""
+READERS = "who reads the pages"
+"""Whom the links on the pages are for: who reaches them is not known here."""
+MUTES = ("3", "6", "12", "24")
+"""Hours for which a glider can be muted."""
 LIVE = "events"
 FLEET_KEPT, GLIDER_KEPT = 60.0, 300.0
 """Seconds for which a page holds while the state file does not change."""
@@ -50,6 +57,13 @@ LOOK = 1.0
 SIGN = 15.0
 """Seconds between two signs of life of a stream of news: proxies close silent ones."""
 MOST = 10_000
+EXPLORED = 3000
+"""Dives of a glider, a year of them, that are explored at the most."""
+DRAWN = (
+    "default-src 'none'; script-src 'self'; style-src 'unsafe-inline'; connect-src 'self'; "
+    "img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+"""The policy of the plots to explore: Bokeh makes styles as it draws, and has its icons in them."""
 _FORM = 2000
 """Bytes of a form that is read."""
 
@@ -57,8 +71,8 @@ _FORM = 2000
 class Site:
     """What is shown of one state file."""
 
-    def __init__(self, config: Config, acknowledge: Acknowledge) -> None:
-        self.config, self.acknowledge = config, acknowledge
+    def __init__(self, config: Config, acknowledge: Acknowledge, mute: Mute) -> None:
+        self.config, self.acknowledge, self.mute = config, acknowledge, mute
         self.state = Path(config.state.path)
         self.key = links.key_of(self.state)
         self.pages = PageCache(self._make, lambda: stamp_of(self.state), self._kept)
@@ -84,22 +98,45 @@ class Site:
         store = Store.reading(self.state)
         try:
             with store.guarded():
-                for name in store.gliders():
-                    for kind, page in (("", render.glider_page), ("-sheet", render.sheet_page)):
-                        if path == render.file_of(name, kind):
-                            attention, battery = self.config.attention(name), self._battery(name)
-                            view = read_glider(store, name, attention, frame.now, battery=battery)
-                            return page(view, frame, land_or_world(self.config.maps.files)[0])
+                for name in names_of(store, self.config.gliders):
+                    if path in (render.file_of(name), render.file_of(name, "-sheet")):
+                        attention, battery = self.config.attention(name), self._battery(name)
+                        view = read_glider(store, name, attention, frame.now, battery=battery)
+                        land = land_or_world(self.config.maps.files)[0]
+                        if path == render.file_of(name):
+                            return render.glider_page(view, frame, land, self._take_on(view))
+                        return render.sheet_page(view, frame, land)
         finally:
             store.close()
         raise KeyError(path)
+
+    def _take_on(self, view: GliderView) -> dict[str, str]:
+        """The links of a page by which what goes on can be taken on, and the glider muted: signed, so that no
+        other page can have a browser follow them."""
+        ids = {m.id: m.id for m in view.open_matters if m.can_be_taken_on}
+        ids[view.name] = f"{view.name}/mute"
+        return {what: f"ack/{links.token(self.key, identity, READERS)}" for what, identity in ids.items()}
+
+    def explored(self, path: str) -> GliderView | None:
+        """All that is known of the glider of a page, to be explored; None where there is no such page."""
+        store = Store.reading(self.state)
+        try:
+            with store.guarded():
+                for name in names_of(store, self.config.gliders):
+                    if path == render.file_of(name, ending="json"):
+                        limits, now = self._battery(name), time.time()
+                        attention = self.config.attention(name)
+                        return read_glider(store, name, attention, now, dives=EXPLORED, battery=limits)
+        finally:
+            store.close()
+        return None
 
     def fleet(self, now: float, dives: int = 1) -> tuple[GliderView, ...]:
         """All gliders as known at `now` (s), with so many dives of each."""
         store = Store.reading(self.state)
         try:
             with store.guarded():
-                names = sorted({*self.config.gliders, *store.gliders()})
+                names = names_of(store, self.config.gliders)
                 batteries = {name: self._battery(name) for name in names}
                 return read_fleet(store, names, self.config.attention, now, dives, batteries)
         finally:
@@ -193,34 +230,67 @@ async def openapi(_request: Request) -> Response:
     return JSONResponse(api.openapi())
 
 
+async def explore(request: Request) -> Response:
+    """The plots of a glider to explore, their values, and the scripts that draw them."""
+    path, site = request.path_params["file"], _site(request)
+    if path == "explore.js":
+        return Response(render.part(path), media_type="text/javascript")
+    with suppress(KeyError):
+        kept = {"Cache-Control": "max-age=86400"}
+        return Response(explorer.script(path), media_type="text/javascript", headers=kept)
+    name, _, ending = path.rpartition(".")
+    data = f"{name}.json"
+    view = await run_in_threadpool(site.explored, data)
+    if view is None or ending not in ("html", "json"):
+        raise HTTPException(404, "There is no such page.")
+    if path == data:
+        text = await run_in_threadpool(explorer.plots, view)
+        return Response(text, media_type="application/json", headers={"Cache-Control": "no-cache"})
+    page = render.explore_page(view.name, render.href(data), view.now)
+    return HTMLResponse(page, headers={"Cache-Control": "no-cache", "Content-Security-Policy": DRAWN})
+
+
 async def acknowledge(request: Request) -> Response:
-    """GET: a button, as scanners of mail open links. POST: takes the incident on."""
+    """GET: buttons, as scanners of mail open links. POST: takes the incident on, or mutes its glider."""
     site = _site(request)
     frame = Frame(time.time(), time.time() + FLEET_KEPT)
     try:
         seconds = site.config.web.link_hours * 3600.0
         incident, recipient = links.opened(site.key, request.path_params["token"], seconds)
         if request.method == "POST":
-            who = await _who(request, recipient)
-            told = await run_in_threadpool(site.acknowledge, incident, who, frame.now)
-            return _ack_page(frame, incident, recipient, told=told)
+            form = await _form(request)
+            if form.get("what") == "mute":
+                hours = form.get("hours", "")
+                end = frame.now + 3600.0 * float(hours if hours in MUTES else MUTES[0])
+                answer = await run_in_threadpool(site.mute, incident.partition("/")[0], end, frame.now)
+            else:
+                who = _who(form.get("by", ""), recipient)
+                answer = await run_in_threadpool(site.acknowledge, incident, who, frame.now)
+            return _ack_page(frame, incident, recipient, answer=answer)
     except links.LinkError as error:
-        return _ack_page(frame, "", "", told=str(error), status=403)
+        return _ack_page(frame, "", "", answer=str(error), status=403)
     except GliderwatchError as error:
-        return _ack_page(frame, "", "", told=str(error), status=409)
+        return _ack_page(frame, "", "", answer=str(error), status=409)
     return _ack_page(frame, incident, recipient)
 
 
-async def _who(request: Request, recipient: str) -> str:
-    """Who takes it on: the name that was typed, beside the recipient of the link."""
+async def _form(request: Request) -> dict[str, str]:
+    """What was typed; nothing of a form that is too long."""
     length = int(request.headers.get("content-length", _FORM + 1))
     typed = parse_qs((await request.body()).decode("utf-8", "replace")) if length <= _FORM else {}
-    name = clean(typed.get("by", [""])[0], 40)
+    return {name: values[0] for name, values in typed.items()}
+
+
+def _who(typed: str, recipient: str) -> str:
+    """Who takes it on: the name that was typed, beside the recipient of the link."""
+    name = clean(typed, 40)
     return f"{name} ({recipient})" if name else recipient
 
 
-def _ack_page(frame: Frame, incident: str, recipient: str, *, told: str = "", status: int = 200) -> Response:
-    text = render.ack_page(frame, incident, recipient, told)
+def _ack_page(
+    frame: Frame, incident: str, recipient: str, *, answer: str = "", status: int = 200
+) -> Response:
+    text = render.ack_page(frame, incident, recipient, answer, is_open=links.can_be_taken_on(incident))
     return HTMLResponse(text, status_code=status, headers={"Cache-Control": "no-store"})
 
 
@@ -260,18 +330,20 @@ class Headers:
 
         async def sending(message: Message) -> None:
             if message["type"] == "http.response.start":
-                message["headers"] = [*message.get("headers", []), *self._headers]
+                given = list(message.get("headers", []))
+                names = {name for name, _ in given}
+                message["headers"] = given + [pair for pair in self._headers if pair[0] not in names]
             await send(message)
 
         await self._app(scope, receive, sending)
 
 
-def application(config: Config, acknowledge_incident: Acknowledge) -> Starlette:
+def application(config: Config, acknowledge_incident: Acknowledge, mute_glider: Mute) -> Starlette:
     """The application for a configuration. Raises GliderwatchError where its key cannot be had."""
 
     @asynccontextmanager
     async def life(app: Starlette) -> AsyncIterator[None]:
-        app.state.site = Site(config, acknowledge_incident)
+        app.state.site = Site(config, acknowledge_incident, mute_glider)
         looking = asyncio.create_task(app.state.site.look())
         yield
         looking.cancel()
@@ -286,6 +358,7 @@ def application(config: Config, acknowledge_incident: Acknowledge) -> Starlette:
             Route("/api/gliders.geojson", geojson),
             Route("/api/openapi.json", openapi),
             Route("/ack/{token}", acknowledge, methods=["GET", "POST"]),
+            Route("/explore/{file}", explore),
             Route("/{file}", page),
         ],
         middleware=[Middleware(Headers), Middleware(TrustedHostMiddleware, allowed_hosts=hosts(config))],
