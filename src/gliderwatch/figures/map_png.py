@@ -134,11 +134,14 @@ def _areas(axis: Any, view: Frame, chart: Chart) -> None:
 
 
 def _tracks(axis: Any, view: Frame, chart: Chart) -> None:
-    for track in chart.tracks:
+    """Tracks in their colours; what is not judged is dashed."""
+    colours = chart.track_colours or ("quiet",) * len(chart.tracks)
+    for track, colour in zip(chart.tracks, colours, strict=True):
         xy = view.xy(*np.array(track).T)
         jumps = np.abs(np.diff(xy[:, 0])) > WIDTH  # to the other side of the date line
         xy = np.insert(xy, np.flatnonzero(jumps) + 1, np.nan, axis=0)
-        axis.plot(*xy.T, "-", color=VERDICTS["quiet"], linewidth=1.3, zorder=4)
+        dashes = "--" if chart.track_colours and colour == "quiet" else "-"
+        axis.plot(*xy.T, dashes, color=VERDICTS[colour], linewidth=2.2 if colour == "bad" else 1.5, zorder=4)
 
 
 def _currents(axis: Any, view: Frame, chart: Chart) -> None:

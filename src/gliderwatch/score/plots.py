@@ -16,6 +16,14 @@ from gliderwatch.score.measures import FaultScore
 from gliderwatch.score.summary import Summary, tables
 
 _COLUMNS = 4
+_SIZES = {
+    "remora": "drag (times the usual)",
+    "fouling": "drag (times the usual)",
+    "compass": "compass error (rad)",
+    "dac_wrong": "error of the current (m/s)",
+    "strong_current": "added current (m/s)",
+}
+"""What the size of a fault is, of those that are no part of what is lost."""
 _HEAD = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>gliderwatch score</title><style>
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 75rem; margin: 2rem auto; padding: 0 1rem }
@@ -69,7 +77,7 @@ def _by_fault(scores: Sequence[FaultScore], draw: Any) -> str:
             some = [s for s in scores if (s.fault, s.estimator) == (fault, estimator)]
             draw(axis, some, COLOURS[i % len(COLOURS)], estimator, top)
         axis.set_title(fault, fontsize=10)
-        axis.set_xlabel("size")
+        axis.set_xlabel(_SIZES.get(fault, "part lost (1)"))
         axis.margins(x=0.15)
     axes.flat[0].legend(fontsize=7)
     return as_svg(figure)
@@ -91,7 +99,7 @@ def _draw_delay(axis: Any, scores: Sequence[FaultScore], colour: str, name: str,
             text = f"{100 * s.detected.value:.0f}%"
             axis.annotate(text, at, (3, 3), textcoords="offset points", fontsize=7, color=colour)
     axis.set_ylim(0, 1.15 * top)
-    axis.set_ylabel("hours")
+    axis.set_ylabel("delay (h)")
 
 
 def _draw_unexpected(axis: Any, scores: Sequence[FaultScore], colour: str, name: str, _: float) -> None:
@@ -109,7 +117,7 @@ def _draw_unexpected(axis: Any, scores: Sequence[FaultScore], colour: str, name:
         capsize=2,
     )
     axis.set_ylim(bottom=0)
-    axis.set_ylabel("a glider-month")
+    axis.set_ylabel("messages (1/month)")
 
 
 def _roc(summary: Summary) -> str:
@@ -126,8 +134,8 @@ def _roc(summary: Summary) -> str:
     axis.set_xscale("symlog", linthresh=0.1)
     axis.set_xlim(left=0)
     axis.set_ylim(0, 1.02)
-    axis.set_xlabel("false flag 1 a glider-month")
-    axis.set_ylabel("part of losses of speed detected")
+    axis.set_xlabel("false flag 1 (1/month of a glider)")
+    axis.set_ylabel("part of losses of speed detected (1)")
     axis.legend()
     return as_svg(figure)
 

@@ -22,7 +22,9 @@ LIMIT = 2.0
 """Seconds for which a mail waits for its pictures: a fifth of one is usual."""
 DIVES, PLACES = 40, 20
 """Dives in the plot of the speed, and on the map, at the most: those of the last days."""
-_NICENESS = 3
+HANGS = 30.0
+"""Seconds after which the process counts as hung, and is begun anew: one that is only slow stays warm."""
+_NICENESS = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,12 +69,15 @@ def draw(job: PictureJob) -> tuple[Picture, ...]:
 
 
 def warm(maps: tuple[str, ...]) -> None:
-    """Load what the first picture would wait for: matplotlib, its fonts, the coast."""
-    from gliderwatch.figures import map_png
+    """Load what the first picture would wait for: matplotlib, its fonts, the coast, the readers of state."""
+    import gliderwatch.pages.maps
+    import gliderwatch.pages.reading  # noqa: F401
+    from gliderwatch.figures import dives, map_png, plots
     from gliderwatch.figures.chart import Chart, Mark
     from gliderwatch.figures.map_files import land_or_world
 
     map_png.png(Chart("", marks=(Mark((0.0, 0.0), "warm"),)), land_or_world(maps)[0])
+    plots.png(dives.speed(()))
 
 
 class MailPictures:
@@ -104,13 +109,14 @@ class MailPictures:
         if not alert.glider:
             return ()
         job = PictureJob(self._state, alert.glider, self.attention(alert.glider), self._now(), self._maps)
-        making = self._process.begin(self._draw, job, self._limit, self._state)
+        making = self._process.begin(self._draw, job, HANGS, self._state)
         if making is None:
             return ()
         try:
             return making.result(self._limit)
         except NotInTime:
-            making.cancel()
+            if not making.running():
+                making.cancel()  # it waits behind others, and nobody waits for it
             reason = f"not drawn within {self._limit:g} s"
         except Exception as error:  # whatever a drawing does, the mail goes
             reason = str(error) or type(error).__name__
