@@ -38,7 +38,7 @@ def made(place: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, M
     """Its report."""
     (mission,) = missions.find([str(place)])
     out = tmp_path_factory.mktemp("reports")
-    return out / mission.name, mission, report.make_in(out, "joint", mission)
+    return out / mission.name, mission, report.make_in(out, "joint", None, mission)
 
 
 def test_both_kinds_of_files_are_judged_and_compared(made: tuple[Path, Mission, Hindcast]) -> None:
@@ -78,14 +78,14 @@ def test_what_is_done_is_not_done_again(made: tuple[Path, Mission, Hindcast], mo
         raise AssertionError("judged again")
 
     monkeypatch.setattr(report.hindcast, "hindcast", never)
-    assert report.make(mission, out, "joint") == found
+    assert report.make_in(out.parent, "joint", None, mission) == found
     with pytest.raises(AssertionError, match="judged again"):
-        report.make(mission, out, "adaptive")
+        report.make_in(out.parent, "adaptive", None, mission)
 
 
 def test_the_papers_law_shows_its_error_and_its_basis(place: Path, tmp_path: Path) -> None:
     (mission,) = missions.find([str(place / "sent")])
-    found = report.make_in(tmp_path, "adaptive:franklin", Mission("x", str(place), "sim", False, True))
+    found = report.make_in(tmp_path, "adaptive:franklin", None, Mission("x", str(place), "sim", False, True))
     assert mission.full is False
     assert found.estimator == "adaptive:franklin"
     with netCDF4.Dataset(tmp_path / "x" / report.NUMBERS) as data:
@@ -109,7 +109,7 @@ def test_folders_that_hold_no_mission_are_named(tmp_path: Path) -> None:
     with pytest.raises(GliderwatchError, match="is not a folder"):
         missions.find([str(tmp_path / "none")])
     with pytest.raises(GliderwatchError, match="there is no estimator"):
-        report.make_in(tmp_path, "best", Mission("x", str(tmp_path), "sim", False, True))
+        report.make_in(tmp_path, "best", None, Mission("x", str(tmp_path), "sim", False, True))
 
 
 def test_a_scheduler_that_does_not_answer_is_named(monkeypatch) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from gliderwatch import __version__
 from gliderwatch.archive.missions import Mission, is_full, local
+from gliderwatch.config import load
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.estimation.dive_measurement import observe
 from gliderwatch.model import Array, Assessment, Dive, Incident, SegmentId, readonly
@@ -110,16 +111,16 @@ class Evidence:
         return self.full or self.online
 
 
-def hindcast(mission: Mission, out: Path, estimator: str = "joint") -> tuple[Hindcast, Evidence]:
+def hindcast(mission: Mission, out: Path, estimator: str, settings: Path | None) -> tuple[Hindcast, Evidence]:
     """Judge a mission again, leaving the results of each replay in `out`.
 
-    `estimator` is `joint`, `adaptive`, or `adaptive:PRESET`. Raises GliderwatchError where nothing can be
-    judged.
+    `estimator` is `joint`, `adaptive`, or `adaptive:PRESET`; where `settings` names a configuration, what it
+    says of the glider counts instead. Raises GliderwatchError where nothing can be judged.
     """
     assessed: dict[str, tuple[Assessment, ...]] = {"online": (), "full": ()}
     judged = dict[str, Judged]()
     measured, centres, sigma = list[MeanCurrent](), readonly(np.empty((0, 2))), 0.0
-    config = configured(mission.glider, _settings(estimator))
+    config = configured(mission.glider, _settings(estimator)) if settings is None else load(settings)
     with local(mission.place) as folder:
         caches = tuple(sorted({path.parent for path in folder.rglob("*") if is_cache(path.name)}))
         files = find_files([folder])
@@ -146,7 +147,7 @@ def hindcast(mission: Mission, out: Path, estimator: str = "joint") -> tuple[Hin
     found = Hindcast(
         mission.name,
         mission.glider,
-        estimator,
+        estimator if settings is None else config.glider(mission.glider).estimator,
         judged.get("online"),
         judged.get("full"),
         _difference(assessed, judged) if both else None,
@@ -262,11 +263,12 @@ def mean_currents(dives: Iterable[Dive]) -> list[MeanCurrent]:
     return out
 
 
-def fingerprint(mission: Mission, estimator: str) -> str:
-    """A short hash of all that a hindcast rests on: files with their sizes, the estimator, the version."""
+def fingerprint(mission: Mission, estimator: str, settings: Path | None) -> str:
+    """A short hash of all that a hindcast rests on: files with their sizes, settings, the version."""
     with local(mission.place) as folder:
         listed = [f"{path.name} {path.stat().st_size}" for path in find_files([folder])]
-    parts = [__version__, repr(mission), estimator, *sorted(listed)]
+    chosen = "" if settings is None else settings.read_text(encoding="utf-8")
+    parts = [__version__, repr(mission), estimator, chosen, *sorted(listed)]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 

@@ -22,21 +22,18 @@ from gliderwatch.model import Kind
 RESULT, PAGE, PAPER, NUMBERS = "hindcast.json", "report.html", "report.pdf", "figures.nc"
 
 
-def make_in(root: Path, estimator: str, mission: Mission) -> Hindcast:
-    """The work on one mission, its report in a folder of its own below `root`."""
-    return make(mission, root / mission.name, estimator)
+def make_in(root: Path, estimator: str, settings: Path | None, mission: Mission) -> Hindcast:
+    """Judge a mission again and write its report into a folder of its own below `root`, or read what an
+    earlier run wrote of the same.
 
-
-def make(mission: Mission, out: Path, estimator: str) -> Hindcast:
-    """Judge a mission again and write its report into `out`, or read what an earlier run wrote of the same.
-
+    `estimator` and `settings` as `hindcast.hindcast` has them.
     Raises GliderwatchError where nothing can be judged, or a file cannot be written.
     """
-    key = hindcast.fingerprint(mission, estimator)
+    out, key = root / mission.name, hindcast.fingerprint(mission, estimator, settings)
     done, result = out / f"done-{key}", hindcast.read(out / RESULT)
     if done.exists() and result is not None:
         return result
-    found, evidence = hindcast.hindcast(mission, out, estimator)
+    found, evidence = hindcast.hindcast(mission, out, estimator, settings)
     try:
         write(out, found, evidence)
         for old in out.glob("done-*"):

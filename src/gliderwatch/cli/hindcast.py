@@ -10,7 +10,7 @@ from pathlib import Path
 
 import click
 
-from gliderwatch.cli.options import example
+from gliderwatch.cli.options import FILE, example
 from gliderwatch.errors import GliderwatchError
 
 
@@ -27,6 +27,9 @@ from gliderwatch.errors import GliderwatchError
 @click.option(
     "--estimator", default="joint", help="joint, adaptive, or adaptive:PRESET of the papers (joint)."
 )
+@click.option(
+    "-c", "--config", "settings", type=FILE, help="A configuration, for the settings of its gliders."
+)
 @click.option("--cluster", help="Address of a Dask scheduler; else a worker a core here.")
 @click.option("--workers", type=click.IntRange(1), help="Workers here (one a core).")
 @click.option("--json", "as_json", is_flag=True, help="Results as JSON, a line a mission.")
@@ -34,6 +37,7 @@ def hindcast(
     missions: tuple[str, ...],
     out: Path,
     estimator: str,
+    settings: Path | None,
     cluster: str | None,
     workers: int | None,
     as_json: bool,
@@ -66,7 +70,9 @@ def hindcast(
             done.append(result)
             advance()
 
-        work = partial(report.make_in, out.resolve(), estimator)
+        work = partial(
+            report.make_in, out.resolve(), estimator, None if settings is None else settings.resolve()
+        )
         failed = dask_cluster.run_all(work, found, client, on_done)
     summary.write(out, done)
     for one in sorted(done, key=lambda h: h.name):

@@ -1,0 +1,81 @@
+"""Four deployments modelled on Table II of paper 000, simulated and judged again by `gliderwatch hindcast`.
+
+`python benchmarks/deployments.py --out DIR [--estimator joint] [--only franklin]`: sbd and dbd files of each
+are written, and the installed command makes the reports. The normal speed is what a pilot of these gliders
+would write (`deployments/gliderwatch.json`). Beside each event stand the surfacings at which dbd and sbd show
+it; the paper has for USF-Sam 11 March 20:00 by dbd and 12 March 03:00 by sbd.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+HERE = Path(__file__).parent / "deployments"
+COMMAND = Path(sys.executable).with_name("gliderwatch")
+
+
+def simulated(name: str, out: Path) -> Path:
+    """The folder of a deployment, with sent and recovered files; made once."""
+    folder = out / "missions" / name
+    if not folder.exists():
+        scenario = str(HERE / f"{name}.yml")
+        subprocess.run(
+            [COMMAND, "simulate", folder, "--scenario", scenario, "--full-rate"],
+            check=True,
+            capture_output=True,
+        )
+    return folder
+
+
+def onset(name: str) -> float:
+    """When the fault of a deployment begins (s)."""
+    from gliderwatch.simulate.scenario_files import load_scenario  # noqa: PLC0415
+
+    return load_scenario(HERE / f"{name}.yml").faults[0].onset
+
+
+def seen(judged: dict | None, after: float) -> str:
+    """The first incident after an event, and how long after it."""
+    if judged is None:
+        return "no files"
+    opened = sorted((one["opened_at"], one["kind"]) for one in judged["incidents"])
+    before = sum(t < after for t, _ in opened)
+    first = next(((t, kind) for t, kind in opened if t >= after), None)
+    if first is None:
+        return "not seen" + (f", {before} before" if before else "")
+    when = datetime.fromtimestamp(first[0], UTC).strftime("%d %b %H:%M")
+    return f"{when} ({(first[0] - after) / 3600:+.0f} h, {first[1]})" + (
+        f", {before} before" if before else ""
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--estimator", default="joint")
+    parser.add_argument("--only", action="append", default=[])
+    options = parser.parse_args()
+    names = options.only or sorted(path.stem for path in HERE.glob("*.yml"))
+    folders = [simulated(name, options.out) for name in names]
+    done = subprocess.run(
+        [COMMAND, "hindcast", *folders, "--out", options.out / options.estimator.replace(":", "-"), "--json",
+         *(["--estimator", options.estimator] if options.estimator != "joint" else
+           ["-c", HERE / "gliderwatch.json"])],
+        check=False, capture_output=True, text=True,
+    )  # fmt: skip
+    print(done.stderr, file=sys.stderr)
+    print(f"{'deployment':<14}{'event':>14}  {'by dbd':<34}{'by sbd':<34}")
+    for line in done.stdout.splitlines():
+        found = json.loads(line)
+        t = onset(found["name"])
+        event = datetime.fromtimestamp(t, UTC).strftime("%d %b %H:%M")
+        print(f"{found['name']:<14}{event:>14}  {seen(found['full'], t):<34}{seen(found['online'], t):<34}")
+
+
+if __name__ == "__main__":
+    main()
