@@ -17,6 +17,7 @@ from gliderwatch.model import Alert, Kind, SegmentId, Severity
 from gliderwatch.params import GliderParams
 from gliderwatch.service import judgement, transaction
 from gliderwatch.service.replay import Request, replay
+from gliderwatch.service.replay_of_nothing import unassessed
 from gliderwatch.service.routing import Routing
 from gliderwatch.store.state_file import Status, Store
 
@@ -221,6 +222,7 @@ def test_log_that_names_no_glider_waits_and_one_of_another_is_unknown(dock: Dock
     path = dock.write(T0, "Connection Event: Carrier Detect found.\n")
     dock.come(path, T0)
     (file,) = dock.store.files(Status.WAITING)
+    assert "Vehicle Name:" in str(unassessed(dock.store, ()))
     assert "Vehicle Name:" in file.reason
     dock.write(T0, "Vehicle Name: nemo\n", mode="a")
     dock.come(path, T0)
@@ -232,6 +234,7 @@ def test_replay_of_two_real_calls_of_which_one_sent_nothing(shared_data: Path) -
     alerts = report.store.alerts()
     assert [(a.kind, a.severity) for a in alerts] == [(Kind.CALL, Severity.INFO)]
     assert report.files[Status.TAKEN] == 2
+    assert unassessed(report.store, ()) is None, "of logs alone no dive is expected"
 
 
 class TestAnnouncedFiles:

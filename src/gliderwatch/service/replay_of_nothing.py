@@ -10,6 +10,7 @@ from pathlib import Path
 
 from gliderwatch.messages.formatting import clean
 from gliderwatch.slocum import folders
+from gliderwatch.slocum.folders import is_log
 from gliderwatch.store.state_file import File, Status, Store
 
 _ABOVE = 4
@@ -20,8 +21,12 @@ _SHOWN = 3
 
 
 def unassessed(store: Store, folders: Iterable[Path]) -> str | None:
-    """Why the replay of `folders` assessed no dive, with the cure; None where it assessed one."""
+    """Why the replay of `folders` assessed no dive, with the cure; None where it assessed one, or where logs of
+    calls are all there is, and one was read."""
     if any(store.extent(glider)[1] for glider in store.gliders()):
+        return None
+    is_of_calls = all(is_log(Path(file.path).name) for file in store.files(*Status))
+    if is_of_calls and store.files(Status.TAKEN):
         return None
     left_out = {s: store.files(s) for s in (Status.WAITING, Status.UNKNOWN, Status.QUARANTINED)}
     status = max(left_out, key=lambda s: len(left_out[s]))
