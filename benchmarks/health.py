@@ -135,9 +135,8 @@ def real(data: Path) -> None:
     """Print which rules could look at something on real missions, and the messages of health."""
     for folder in sorted(path for path in data.iterdir() if path.is_dir()):
         store = replay(Request((folder,), (folder / "cache",))).store
-        looked = {
-            rule for glider in store.gliders() for _, judged in store.health.judged(glider) for rule in judged
-        }
+        gliders = [row[0] for row in store._db.execute("SELECT DISTINCT glider FROM health")]
+        looked = {rule for glider in gliders for _, judged in store.health.judged(glider) for rule in judged}
         found = [alert.title for alert in store.alerts() if alert.kind is Kind.HEALTH]
         store.close()
         print(f"{folder.name}: {len(looked)} of {len(RULES)} rules could look, {len(found)} messages {found}")

@@ -21,8 +21,8 @@ _SHOWN = 3
 
 
 def unassessed(store: Store, folders: Iterable[Path]) -> str | None:
-    """Why the replay of `folders` assessed no dive, with the cure; None where it assessed one, or where logs of
-    calls are all there is, and one was read."""
+    """Why the replay of `folders` assessed no dive, with the cure; None where it assessed one, or where logs
+    are all there is, and one was read."""
     if any(store.extent(glider)[1] for glider in store.gliders()):
         return None
     is_of_calls = all(is_log(Path(file.path).name) for file in store.files(*Status))
