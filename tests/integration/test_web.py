@@ -314,6 +314,8 @@ def test_a_message_of_an_incident_ends_with_links(client: TestClient, config: Co
     (sent,) = kept.sent
     path = re.search(r"^Take it on: https://g\.example\.org(/ack/\S+)$", sent.body, re.M)
     assert path is not None
+    for text in (sent.body, sent.html, sent.brief):
+        assert text.count("Take it on") == 1 and "sudo" not in text  # the link is instead of the command
     assert "Page: https://g.example.org/electa.html" in sent.body
     assert sent.html.count("<a href") >= 2
     assert (sent.id, sent.title) == (alert.id, alert.title)

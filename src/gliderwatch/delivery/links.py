@@ -6,6 +6,7 @@ Those are signed for the incident and for who gets the message, and hold for a t
 from __future__ import annotations
 
 import os
+import re
 import secrets
 from dataclasses import dataclass, replace
 from html import escape
@@ -149,6 +150,8 @@ def with_links(alert: Alert, links: tuple[tuple[str, str], ...]) -> Alert:
     """A message with links below what to do, before its numbers; one without that ends with them."""
     if not links:
         return alert
+    if any(label == "Take it on" for label, _ in links):
+        alert = _without_command(alert)
     lines = "\n".join(f"{label}: {url}" for label, url in links)
     brief = f"{alert.brief.rstrip()}\n\n{lines}\n" if alert.brief else ""
     rest = alert.body.removeprefix(alert.brief) if alert.brief else ""
@@ -157,4 +160,13 @@ def with_links(alert: Alert, links: tuple[tuple[str, str], ...]) -> Alert:
     place = f"{end}\n<p>{shown}</p>" if end == "</ul>" else f"<p>{shown}</p>\n{end}"
     html = alert.html.replace(end, place, 1)
     body = f"{brief}{rest}" if brief and rest != alert.body else f"{alert.body.rstrip()}\n\n{lines}\n"
+    return replace(alert, body=body, html=html, brief=brief)
+
+
+_COMMAND = re.compile(r"^(<b>)?Take it on:(</b>)? sudo .*\n", re.MULTILINE)
+
+
+def _without_command(alert: Alert) -> Alert:
+    """A message without the command that takes its incident on: there is a link for that."""
+    body, html, brief = (_COMMAND.sub("", text) for text in (alert.body, alert.html, alert.brief))
     return replace(alert, body=body, html=html, brief=brief)
