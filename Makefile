@@ -50,7 +50,7 @@ test-all: $(VENV)/installed ## the same, and those marked `slow`: the long versi
 define PYTEST
 @mkdir -p build; rm -f build/tests-*.xml; failed=0; \
 $(BIN)/python -m pytest -m "timing $(SLOW)" $$(grep -rl "mark[.]timing" tests --include="*.py") --junit-xml=build/tests-timing.xml || [ $$? -eq 5 ] || failed=1; \
-$(BIN)/python -m pytest -m "not timing $(SLOW)" -n $(JOBS) --dist worksteal --junit-xml=build/tests-main.xml || failed=1; \
+$(BIN)/python -m pytest -m "not timing $(SLOW)" -n $(JOBS) --dist loadfile --no-loadscope-reorder --junit-xml=build/tests-main.xml || failed=1; \
 exit $$failed
 endef
 

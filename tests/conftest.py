@@ -9,6 +9,22 @@ from hypothesis import settings
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
+ROOMS = ("acceptance", "property", "golden", "integration", "unit")
+"""In what order `make test` begins them: files with long tests first, so that none is left to one process."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files in the order of their rooms, the tests of a file together; those of src last."""
+    places = {name: place for place, name in enumerate(ROOMS)}
+    folder = Path(__file__).parent
+
+    def place(item: pytest.Item) -> int:
+        is_ours = item.path.is_relative_to(folder)
+        return places.get(item.path.relative_to(folder).parts[0], len(ROOMS)) if is_ours else len(ROOMS)
+
+    items.sort(key=place)
+
+
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 

@@ -31,7 +31,9 @@ from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Fault, FaultKind, Mission, Scenario
 from gliderwatch.store.state_file import File, Status, Store
 
-GLIDERWATCH = Path(sys.executable).with_name("gliderwatch")
+_OWN = Path(sys.executable).with_name("gliderwatch")
+GLIDERWATCH = Path(os.environ.get("GLIDERWATCH_COMMAND", _OWN))
+"""The installed command; of another release where the environment names one: what was mended fails there."""
 PATIENCE = 60.0
 PASSWORD = "hunter2-do-not-tell"
 TRACEBACK = "Traceback"
@@ -40,23 +42,31 @@ TRACEBACK = "Traceback"
 def until(condition: Callable[[], object], what: str, patience: float = PATIENCE) -> None:
     """Wait until a condition holds; fail with `what` when it does not in time."""
     deadline = time.monotonic() + patience
+    begun = time.monotonic()
     while not condition():
-        assert time.monotonic() < deadline, f"not within {patience:g} s: {what}"
-        time.sleep(0.02)
+        now = time.monotonic()
+        assert now < deadline, f"not within {patience:g} s: {what}"
+        time.sleep(max(0.02, now - begun))  # to look takes at most half of a core from what is waited for
+        begun = time.monotonic()
 
 
 def command(
     *arguments: object, cwd: Path | None = None, timeout: float = 120.0, **env: str
 ) -> subprocess.CompletedProcess[str]:
     """Run a command in a process of its own that is ready for it, and wait for its end."""
+    if GLIDERWATCH != _OWN:
+        return installed(*arguments, cwd=cwd, timeout=timeout, **env)
     words = [str(GLIDERWATCH), *map(str, arguments)]
     return warm.run(words, os.environ | env, cwd or Path.cwd(), timeout)
 
 
-def installed(*arguments: object, timeout: float = 120.0, **env: str) -> subprocess.CompletedProcess[str]:
+def installed(
+    *arguments: object, cwd: Path | None = None, timeout: float = 120.0, **env: str
+) -> subprocess.CompletedProcess[str]:
     """The same by the installed program, from the start of Python on."""
     return subprocess.run(
         [str(GLIDERWATCH), *map(str, arguments)],
+        cwd=cwd,
         env=os.environ | env,
         capture_output=True,
         text=True,
