@@ -4,9 +4,9 @@ PYTHON ?= python3
 # Wheels only, so that nothing is compiled behind your back. dbdreader has none for CPython 3.14
 # and for ARM: there, `make test WHEELS=` builds that one from source.
 WHEELS ?= --only-binary :all:
-# pytest processes: one more than the cores of a small machine, as many tests wait for what is due. Those
+# pytest processes: two for each core of a small machine, as many tests wait for what is due. Those
 # marked `timing` always run alone.
-JOBS ?= 3
+JOBS ?= 4
 # Of `make chaos`: how long it takes, and what all its moments follow from.
 MINUTES ?= 30
 SEED ?= 1

@@ -273,14 +273,19 @@ def lacks_key(entry: Mapping[str, Any], gliders: Iterable[str]) -> str | None:
 
 
 class Daemon:
-    """The service as a process. Its log goes to a file, which lives on from start to start."""
+    """The service as a process. Its log goes to a file, which lives on from start to start.
 
-    def __init__(self, site: Site, program: Sequence[object] = (GLIDERWATCH,), **env: str) -> None:
-        self.site, self.program, self.env = site, [str(part) for part in program], env
+    A `program` is started as it is, and so is the installed one where the environment has modules for it.
+    """
+
+    def __init__(self, site: Site, program: Sequence[object] = (), **env: str) -> None:
+        self.site, self.env = site, env
+        self.is_warm = not program and GLIDERWATCH == _OWN and "PYTHONPATH" not in env
+        self.program = [str(part) for part in program or (GLIDERWATCH,)]
         self.log_path = site.config.with_name("daemon.log")
         self.scratch = site.config.with_name("scratch")
         self.scratch.mkdir(exist_ok=True)
-        self.process: subprocess.Popen[bytes] | None = None
+        self.process: subprocess.Popen[bytes] | warm.Service | None = None
         self._begun = 0
 
     def __enter__(self) -> Daemon:
@@ -296,14 +301,14 @@ class Daemon:
 
     def start(self) -> Daemon:
         """Start it; `ready` waits until it watches."""
+        words = [*self.program, "run", "-c", str(self.site.config)]
+        env = os.environ | {"TMPDIR": str(self.scratch)} | self.env
         with self.log_path.open("ab") as log:
             self._begun = log.tell()
-            self.process = subprocess.Popen(
-                [*self.program, "run", "-c", self.site.config],
-                env=os.environ | {"TMPDIR": str(self.scratch)} | self.env,
-                stderr=log,
-                stdout=log,
-            )
+            if self.is_warm:
+                self.process = warm.Service(words, env, self.log_path)
+            else:
+                self.process = subprocess.Popen(words, env=env, stderr=log, stdout=log)
         return self
 
     @property

@@ -7,6 +7,7 @@ import re
 import signal
 import socket
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import pytest
 from acceptance.angus import FILES, plenty, put, taken
 from acceptance.chaos import hooked
 from acceptance.support import (
+    GLIDERWATCH,
     TRACEBACK,
     Daemon,
     Site,
@@ -33,15 +35,18 @@ from gliderwatch.store.state_file import Status
 # --------------------------------------------------------------------------- signals
 
 
-def test_sigterm_ends_it_cleanly(site: Site, daemon: Daemon) -> None:
-    put(site, *FILES)
-    taken(site, *FILES)
-    workers = children(daemon.pid)
-    assert workers
-    assert daemon.stop() == 0
-    until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in workers), "no process is left")
-    assert daemon.log("stopped")
-    assert list(daemon.scratch.iterdir()) == []
+@pytest.mark.parametrize("program", [(GLIDERWATCH,), ()], ids=["installed", "forked"])
+def test_sigterm_ends_it_cleanly(site: Site, program: Sequence[object]) -> None:
+    with Daemon(site, program) as daemon:
+        put(site, *FILES)
+        taken(site, *FILES)
+        workers = children(daemon.pid)
+        assert workers
+        assert daemon.stop() == 0
+        until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in workers), "no process is left")
+        assert daemon.log("stopped")
+        assert list(daemon.scratch.iterdir()) == []
+    assert TRACEBACK not in daemon.text()
 
 
 def test_no_process_is_left_after_sigkill(site: Site) -> None:

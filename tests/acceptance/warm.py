@@ -1,8 +1,9 @@
 """Commands in processes of their own that need not import the package again.
 
 To start Python and import gliderwatch is nearly all that a command costs. A server that has imported it forks
-for each: own arguments, environment, folder and outputs, one exit code. `support.installed` starts the
-program itself, as `support.Daemon` does; `test_commands` compares the two.
+for each: own arguments, environment, folder and outputs, one exit code. So it is with the service of most
+tests. `support.installed` starts the program itself, as `support.Daemon` does with a `program`;
+`test_commands` compares the two.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import gc
 import multiprocessing
 import os
+import signal
 import sys
 import tempfile
 import time
@@ -36,7 +38,7 @@ def _main(arguments: Sequence[str], env: Mapping[str, str], cwd: Path, outputs: 
     tempfile.tempdir = None
     os.chdir(cwd)
     for number, path in enumerate(outputs, 1):
-        target = os.open(path, os.O_WRONLY)
+        target = os.open(path, os.O_WRONLY | os.O_APPEND)
         os.dup2(target, number)
         os.close(target)
     sys.argv = list(arguments)
@@ -66,3 +68,42 @@ def run(arguments: Sequence[str], env: Mapping[str, str], cwd: Path, timeout: fl
             raise TimeoutExpired(list(arguments), timeout)
         out, err = (path.read_text(encoding="utf-8") for path in outputs)
         return CompletedProcess(list(arguments), process.exitcode, out, err)
+
+
+class Service:
+    """A command that runs on, with what tests use of `subprocess.Popen`. What it says is added to a file."""
+
+    def __init__(self, arguments: Sequence[str], env: Mapping[str, str], log: Path) -> None:
+        self._process = CONTEXT.Process(target=_main, args=(arguments, dict(env), Path.cwd(), [log, log]))
+        self._process.start()
+
+    @property
+    def pid(self) -> int:
+        """Its process id."""
+        assert self._process.pid is not None
+        return self._process.pid
+
+    @property
+    def returncode(self) -> int | None:
+        """Its exit code, or the signal that ended it as a negative number; None while it runs."""
+        return self._process.exitcode
+
+    def poll(self) -> int | None:
+        """The same."""
+        return self.returncode
+
+    def send_signal(self, number: int) -> None:
+        """Send a signal, if it runs."""
+        if self.returncode is None:
+            os.kill(self.pid, number)
+
+    def kill(self) -> None:
+        """End it as a power cut would."""
+        self.send_signal(signal.SIGKILL)
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Wait for its end; its exit code. Raises TimeoutExpired after `timeout` (s)."""
+        self._process.join(timeout)
+        if self.returncode is None:
+            raise TimeoutExpired("the service", timeout or 0.0)
+        return self.returncode
