@@ -33,6 +33,10 @@ class Memory:
     surfacings: Surfacings = Surfacings()
     expected: NextSurfacing | None = None
 
+    def open(self) -> tuple[Incident, ...]:
+        """The incidents that are open."""
+        return self.rules.open()
+
 
 @dataclass(frozen=True, slots=True)
 class GliderState:
@@ -84,7 +88,7 @@ def process(
     key = digest(params)
     settled, last, assessment, memory = state.settled, state.last, state.assessment, state.memory
     assessments = {assessment.t_dive: assessment} if assessment is not None else {}
-    incidents = {i.id: i for i in settled.rules.open()}
+    incidents = {i.id: i for i in settled.open()}
     waypoints = read_waypoints(state.waypoints, segment)
     changed = {i.id: i for i in state.changed}
     for dive in dives:
@@ -122,7 +126,7 @@ def _after(
     if last is not None and begun is not None and are_apart(last, begun):
         # another deployment, another sea and perhaps another trim: what was open on the last one is over
         over, before = end_all(before.rules, dive.t_dive), Memory()
-    frozen = bool(before.rules.open())
+    frozen = bool(before.open())
     estimate, assessment = step(before.estimate, dive, params, key, frozen, ocean)
     rules, changed = advance(before.rules, assessment, params.rules)
     surfacings, expected = after_dive(

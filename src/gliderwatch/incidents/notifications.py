@@ -101,7 +101,7 @@ def due_notifications(
     (`acks`) has no reminders, unless it has grown worse since. `advice`: where to look next, by the
     name of the field; `layers`: how deep to fly next.
     """
-    latest = facts.last_surfacing(float("inf"))
+    latest, before_it = [*last_dives(facts, 2), None, None][:2]
     if latest is None:
         return notified, []
     threads: list[Thread] = []
@@ -125,7 +125,6 @@ def due_notifications(
     surfaced = notified.surfaced
     if notices and _is_another(latest, surfaced):
         identity = f"{latest.glider}/surfacing/{latest.t_dive:.0f}"
-        before_it = facts.last_surfacing(latest.t_surface - 1.0)
         previous = before_it.t_surface if before_it is not None else None
         content = Surfaced(latest, previous, next_surfacing(facts, latest), advice, layers)
         info = Severity.INFO

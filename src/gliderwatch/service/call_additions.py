@@ -12,12 +12,24 @@ from gliderwatch.forecast.outlook import after_call
 from gliderwatch.incidents.calls import surfacings
 from gliderwatch.incidents.constants import GONE
 from gliderwatch.model import NextSurfacing, Segment, SegmentId
-from gliderwatch.navigation.call_fixes import FromCall, missing_in_file
+from gliderwatch.navigation.call_fixes import FromCall, missing_in_file, with_call
 from gliderwatch.navigation.constants import FILE_TO_CALL
 from gliderwatch.params import GliderParams
 from gliderwatch.slocum.calls import Dialog
 from gliderwatch.store.codec import plain_encode
 from gliderwatch.store.state_file import File, Store
+
+
+def has_calls(store: Store, glider: str) -> bool:
+    """Whether there is anything that calls could add: of most gliders no log is kept."""
+    return store.calls.has(glider)
+
+
+def with_additions(store: Store, segment: Segment, until: float) -> Segment:
+    """A segment with what the calls at its end add to it; the next one opens at `until` (s)."""
+    if not has_calls(store, segment.id.glider):
+        return segment
+    return with_call(segment, added(store, segment, until))
 
 
 def added(store: Store, segment: Segment, until: float = inf) -> FromCall:
@@ -29,6 +41,8 @@ def added(store: Store, segment: Segment, until: float = inf) -> FromCall:
 def touched(store: Store, first: SegmentId) -> SegmentId:
     """The first segment to be processed again, where one was put in its place: the one before it, if a call
     at its end belongs to the new one."""
+    if not has_calls(store, first.glider):
+        return first
     before = store.segments.last_before(first.glider, first.opened_at)
     if before is None or not store.calls.during(first.glider, first.opened_at, inf):
         return first
@@ -50,7 +64,13 @@ def keep_call(store: Store, file: File, dialog: Dialog, now: float) -> None:
         store.segments.outdate(at)
 
 
-def next_surfacing(store: Store, glider: str, params: GliderParams, now: float) -> NextSurfacing | None:
+def expect_by_calls(store: Store, glider: str, params: GliderParams, now: float) -> None:
+    """Keep the next surfacing by the last call, where no file has come of that surfacing by `now` (s)."""
+    if has_calls(store, glider):
+        store.segments.expect_after_call(glider, _next_surfacing(store, glider, params, now))
+
+
+def _next_surfacing(store: Store, glider: str, params: GliderParams, now: float) -> NextSurfacing | None:
     """The next surfacing by the last call, where no file has come of that surfacing by `now` (s)."""
     calls = store.calls.during(glider, max(store.segments.last_surfacing(glider), now - GONE), inf)
     found = [call for call in calls if call.surfaced is not None]

@@ -23,14 +23,13 @@ from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.messages.notice_text import render
 from gliderwatch.messages.template import with_machine
 from gliderwatch.model import Alert, Assessment, Kind, Segment, SegmentId
-from gliderwatch.navigation.call_fixes import with_call
 from gliderwatch.navigation.clock import moved
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
 from gliderwatch.sea.ocean_field import Field
 from gliderwatch.service import fields as fields_of_sea
 from gliderwatch.service import layers as layers_of_sea
-from gliderwatch.service.call_additions import added, keep_call, next_surfacing, touched
+from gliderwatch.service.call_additions import expect_by_calls, keep_call, touched, with_additions
 from gliderwatch.service.fields import FieldAdvice, FleetField, look
 from gliderwatch.service.layers import GliderLayers
 from gliderwatch.service.routing import Routing, post_alerts, post_due, withdraw_answered
@@ -255,7 +254,7 @@ def _run(
         if stopping():
             raise StoppedError(f"{identity.name} was not processed: the daemon ends")
         one = fresh if fresh is not None and identity == fresh.id else store.segments.get(identity)
-        one = with_call(one, added(store, one, inf if following is None else following.opened_at))
+        one = with_additions(store, one, inf if following is None else following.opened_at)
         outcome = _process(state, one, params, ocean)
         store.keep(identity, outcome)
         if layers is not None:
@@ -295,7 +294,7 @@ def _due_messages(
     """Make the messages that are due of a glider; none while `routing` is None, or while it is muted."""
     if routing is None:
         return ()
-    store.segments.expect_after_call(glider, next_surfacing(store, glider, params, now))
+    expect_by_calls(store, glider, params, now)
     judged = store.health.judge(glider, routing.limits(glider))
     attention = with_mute(routing.attention(glider), store.notes.muted_until(glider))
     if attention.is_quiet(now):

@@ -275,6 +275,11 @@ class Calls:
         row = self._db.execute("SELECT dialog FROM calls WHERE path = ?", (path,)).fetchone()
         return None if row is None else str(row[0])
 
+    def has(self, glider: str) -> bool:
+        """Whether any call of a glider is held."""
+        sql = "SELECT EXISTS (SELECT 1 FROM calls WHERE glider = ?)"
+        return bool(self._db.execute(sql, (glider,)).fetchone()[0])
+
     def during(self, glider: str, since: float, until: float) -> tuple[Call, ...]:
         """The calls of a glider that went on between two times (s), in order of time."""
         sql = "SELECT call FROM calls WHERE glider = ? AND last_t >= ? AND began <= ? ORDER BY began, path"
