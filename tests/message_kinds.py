@@ -97,7 +97,8 @@ def message(kind: Kind, content: Content, severity: Severity = Severity.CRITICAL
 
 def anomaly(speed: float = 0.112, **evidence: float) -> Alert:
     """The first message of an anomaly with some evidence."""
-    dive = replace(SLOW, speed=speed, evidence={**USUAL, **evidence})
+    words = {"reason": "slower than normal", "notes": ("depth-averaged current is provisional",)}
+    dive = replace(SLOW, speed=speed, reference_final=False, evidence={**USUAL, **evidence}, **words)
     now = situation(dive, 0.256, 0.249, 0.253, 0.118)
     return message(Kind.ANOMALY, Opened(incident(dive), dive, now))
 
@@ -210,6 +211,7 @@ def kinds() -> dict[str, Alert]:
         "acknowledged": acknowledged("boat leaves at 6", is_undone=False),
         "given-back": acknowledged("", is_undone=True),
         "surfacing": message(Kind.SURFACING, Surfaced(HEALTHY, DIVE - 1800, NEXT), info),
+        "surfacing-slow": message(Kind.SURFACING, Surfaced(SLOW, DIVE - 1800, NEXT), info),
         "regime": message(Kind.REGIME, NewRegime(regime, 0.29, DIVE, situation(regime, 0.47, 0.48)), info),
         "overdue": message(Kind.OVERDUE, Overdue(absence(fleet), True), warning),
         "overdue-circle": message(Kind.REMINDER, Overdue(absence(Fleet(), 9100.0), False), warning),

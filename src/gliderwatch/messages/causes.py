@@ -173,8 +173,8 @@ _SURE_REASONS: dict[str, Cause] = {
 
 
 def is_named(reason: str) -> bool:
-    """Whether the words of the estimator are those of a cause, so that they need not be repeated."""
-    return reason in _SURE_REASONS
+    """Whether the words of the estimator are those of a cause or of the title, and need not be repeated."""
+    return reason in _SURE_REASONS or reason in ("slower than normal", "faster than normal")
 
 
 def _of_disagreement(a: Assessment) -> Likely:

@@ -224,7 +224,8 @@ def data_quality(a: Assessment) -> tuple[str, ...]:
     found = tuple(words.format(x) for x, worth, words in values if x is not None and worth(x))
     hours = number(a, "duration_h")
     samples = f"{a.n_samples} samples" + (f" in {hours:.1f} h" if hours is not None else "")
-    return (*current, *found, samples, *(clean(note) for note in a.notes))
+    notes = (clean(note) for note in a.notes if note != "depth-averaged current is provisional")
+    return (*current, *found, samples, *notes)
 
 
 def symbols(a: Assessment) -> tuple[str, ...]:

@@ -239,7 +239,7 @@ def flag_words(assessment: Assessment, *, short: bool = False) -> str:
         return "normal"
     likely = likeliest(Kind.ANOMALY if assessment.flag == Flag.ANOMALY else Kind.FALSE_ALARM, assessment)
     word = "out of its range" if assessment.flag == Flag.ANOMALY else "measurements disagree"
-    return word if short else f"{word} ({likely.cause.words})"
+    return word if short else f"{word}, likeliest {likely.cause.words}"
 
 
 def _name(incident: Incident) -> str:
