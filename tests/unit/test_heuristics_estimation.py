@@ -408,8 +408,8 @@ class TestVerdict:
         ways = [Way()] * 12 + [Way(speed=0.23 * f, own=0.25 * f) for f in speeds]
         assert (self.flown(ways)[-1] is Flag.NORMAL) == new
 
-    @pytest.mark.parametrize(("roll", "hints"), [(0.1, 0), (0.14, 1)])
-    def test_a_step_of_roll_of_7_degrees(self, roll, hints):
+    @pytest.mark.parametrize(("roll", "hints"), [(0.25, 0), (0.27, 1)])
+    def test_a_step_of_roll_of_15_degrees(self, roll, hints):
         state = SpeedState()
         for each in mission([Way()] * 8 + [Way(roll=roll)]):
             state, _ = step(state, each, SpeedParams())

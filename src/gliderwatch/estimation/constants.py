@@ -273,8 +273,9 @@ TURNED = 0.785
 """rad: by how much the glider must have turned before the two can differ: 45 degrees."""
 OWN_SURE = 0.15
 """Standard error of W on a dive, as part of it, up to which the dive tells what W is to what is reported."""
-ROLL_STEP = 0.12
-"""rad: a step of the mean roll that speaks for a lost or bent wing. Healthy gliders roll within 0.05."""
+ROLL_STEP = 0.26
+"""rad, 15 degrees as in the rule of health: a step of the mean roll that speaks for a lost or bent wing. On a
+healthy real mission a new trim made one of 0.18."""
 ROLL_CONFIRMS = 0.67
 """Standard errors by which a speed must be below normal where the glider rolls otherwise for two dives:
 three to one."""
