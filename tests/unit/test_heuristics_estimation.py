@@ -230,7 +230,8 @@ class TestNoise:
 class TestModes:
     def test_how_often_and_how_large(self):
         table = {mode.cause: (mode.chance, mode.size) for mode in (*MODES, modes.ROLLED)}
-        assert [mode.loss for mode in (*MODES, modes.ROLLED)] == [0.0] * 5 + [0.36]
+        assert [mode.loss for mode in (*MODES, modes.ROLLED)] == [0.0] * 6
+        assert (modes.LOST.chance, modes.LOST.size, modes.LOST.loss) == (9.0, 0.27, 0.36)
         assert sum(mode.chance for mode in MODES) == pytest.approx(1.0)
         assert table == {
             Cause.USUAL: (pytest.approx(0.92), 0.0),
@@ -238,7 +239,7 @@ class TestModes:
             Cause.FLOW: (0.03, 0.25),
             Cause.CURRENT: (0.02, 0.4),
             Cause.GROUND: (0.01, 0.3),
-            Cause.WING: (9.0, 0.27),
+            Cause.WING: (9.0, 0.45),
         }
 
     def test_what_was_wrong_is_wrong_again_six_times_of_ten(self):
@@ -408,12 +409,21 @@ class TestVerdict:
         ways = [Way()] * 12 + [Way(speed=0.23 * f, own=0.25 * f) for f in speeds]
         assert (self.flown(ways)[-1] is Flag.NORMAL) == new
 
-    @pytest.mark.parametrize(("roll", "hints"), [(0.25, 0), (0.27, 1)])
-    def test_a_step_of_roll_of_15_degrees(self, roll, hints):
+    @pytest.mark.parametrize(("roll", "hints"), [(0.1, 0), (0.14, 1)])
+    def test_a_step_of_roll_of_7_degrees(self, roll, hints):
         state = SpeedState()
         for each in mission([Way()] * 8 + [Way(roll=roll)]):
             state, _ = step(state, each, SpeedParams())
         assert state.rolled == hints
+
+    @pytest.mark.parametrize(("roll", "hint"), [(0.25, modes.ROLLED), (0.27, modes.LOST)])
+    def test_a_roll_of_15_degrees_is_a_lost_wing(self, roll, hint, monkeypatch):
+        hints, real = [], kalman.step
+        monkeypatch.setattr(kalman, "step", lambda *a: (hints.append(a[4]), real(*a))[1])
+        state = SpeedState()
+        for each in mission([Way()] * 8 + [Way(roll=roll)] * 3):
+            state, _ = step(state, each, SpeedParams())
+        assert hints == [None] * 8 + [hint] * 2 + [None]
 
     @staticmethod
     def flown(ways: list[Way]) -> list[Flag | None]:
@@ -497,7 +507,7 @@ class TestOpened:
         params = JointParams()
         state = kalman.init(params, EAST.t_dive)
         measured = Measured(observe(EAST), None, 1.0, Slipping(0.1, 0.01, None))
-        return kalman._explained(state, measured, params, hint=True).ways
+        return kalman._explained(state, measured, params, hint=modes.LOST).ways
 
     def test_a_wrong_measurement_is_left_out(self):
         (wrong,) = (way for way in self.explained() if way.cause is Cause.CURRENT)

@@ -7,7 +7,7 @@ import pytest
 from gliderwatch.estimation import kalman
 from gliderwatch.estimation.dive_measurement import observe
 from gliderwatch.estimation.kalman import JointParams, step
-from gliderwatch.estimation.modes import MODES, Cause
+from gliderwatch.estimation.modes import MODES, ROLLED, Cause
 from gliderwatch.model import readonly
 from gliderwatch.sea import gauss_markov
 from gliderwatch.sea.gauss_markov import FlowParams, passage, prior
@@ -280,7 +280,7 @@ def test_a_hint_opens_what_cannot_be_seen():
     made = lost_wing(3, lambda k: 0.4)
     state = None
     for k, each in enumerate(mission(made)):
-        state, info = step(state, each, QUIET, hint=k in (20, 21))
+        state, info = step(state, each, QUIET, hint=ROLLED if k in (20, 21) else None)
     assert info.estimate.own_speed == pytest.approx(0.25, abs=0.01)
     assert info.estimate.speed == pytest.approx(0.115, abs=2.5 * info.estimate.sigma)
     assert info.estimate.sigma > 0.015

@@ -143,11 +143,13 @@ GROUND_ERROR = 0.3
 WING_ODDS = 9.0
 """For a wing that was lost or bent, where the glider has just begun to roll otherwise, which little else
 does: nine to one."""
-WING_SLIP = 0.36
-"""Usual slip that it makes, as part of W: the mean of half a normal distribution of 0.45, as no lost wing
+WING_SLIP = 0.45
+"""Usual slip that it makes, as part of W,"""
+LOST_SLIP = 0.36
+"""and where the roll is that of a lost wing: the mean of half a normal distribution of that, as no lost wing
 makes a glider faster,"""
-WING_SPREAD = 0.27
-"""with the standard deviation of that,"""
+LOST_SPREAD = 0.27
+"""and the standard deviation of the same,"""
 WING_SIDE = 0.15
 """rad: and usual side."""
 
@@ -273,8 +275,10 @@ TURNED = 0.785
 """rad: by how much the glider must have turned before the two can differ: 45 degrees."""
 OWN_SURE = 0.15
 """Standard error of W on a dive, as part of it, up to which the dive tells what W is to what is reported."""
-ROLL_STEP = 0.26
-"""rad, 15 degrees as in the rule of health: a step of the mean roll that speaks for a lost or bent wing. On a
+ROLL_STEP = 0.12
+"""rad: a step of the mean roll that speaks for a lost or bent wing. Healthy gliders roll within 0.05."""
+ROLL_LOST = 0.26
+"""rad, 15 degrees as in the rule of health: a step of the mean roll that nothing but a lost wing makes. On a
 healthy real mission a new trim made one of 0.18."""
 ROLL_CONFIRMS = 0.67
 """Standard errors by which a speed must be below normal where the glider rolls otherwise for two dives:

@@ -46,7 +46,6 @@ from gliderwatch.estimation.dive_measurement import (
 from gliderwatch.estimation.kinematic_speed import KinematicSpeed
 from gliderwatch.estimation.modes import (
     MODES,
-    ROLLED,
     Cause,
     Explained,
     Explanations,
@@ -213,14 +212,14 @@ def step(
     dive: Dive,
     params: JointParams,
     usual: float | None = None,
-    hint: bool = False,
+    hint: Mode | None = None,
     kinematic: KinematicSpeed | None = None,
 ) -> tuple[JointState | None, JointInfo | None]:
     """The state after one more dive, and what was found in it; a dive without a track changes nothing.
 
-    ``usual`` is the healthy speed through the water (m/s) where it is known; ``hint`` says that something
-    else speaks for a wing that was lost or bent just now; ``kinematic`` is W as depth rate and pitch,
-    or the mean on board, have it.
+    ``usual`` is the healthy speed through the water (m/s) where it is known; ``hint`` is a mode that
+    something else speaks for just now, that of a wing lost or bent; ``kinematic`` is W as depth rate and
+    pitch, or the mean on board, have it.
     """
     if dive.track is None or dive.start is None or dive.end is None:
         return state, None
@@ -254,10 +253,10 @@ def step(
     )
 
 
-def _explained(state: JointState, measured: Measured, params: JointParams, hint: bool) -> Explanations:
-    """A dive in all modes; ``hint``: also in that of a wing that was lost or bent."""
+def _explained(state: JointState, measured: Measured, params: JointParams, hint: Mode | None) -> Explanations:
+    """A dive in all modes; ``hint``: also in this one."""
     steps, shown = _jump(params.flow)[-SHOWN:], state.cov[-SHOWN:, -SHOWN:]
-    modes = (*switched(params.modes, state.wrong), *((ROLLED,) if hint else ()))
+    modes = (*switched(params.modes, state.wrong), *((hint,) if hint else ()))
     return Explanations.of(explain(state.x[-SHOWN:], shown, steps @ steps.T, measured, modes))
 
 

@@ -29,6 +29,8 @@ from gliderwatch.estimation.constants import (
     ITERATIONS,
     LEAST_SLIP,
     LEFT_OUT,
+    LOST_SLIP,
+    LOST_SPREAD,
     MOST_SIDE,
     MOST_SLIP,
     SPEED_CHANCE,
@@ -37,7 +39,6 @@ from gliderwatch.estimation.constants import (
     WING_ODDS,
     WING_SIDE,
     WING_SLIP,
-    WING_SPREAD,
 )
 from gliderwatch.estimation.dive_measurement import OWN, SIDE, SLIP, Measured, expected
 from gliderwatch.model import Array
@@ -113,9 +114,11 @@ def _with_chances(modes: tuple[Mode, ...], chances: tuple[tuple[Cause, float], .
     )
 
 
-ROLLED = Mode(Cause.WING, WING_ODDS, WING_SPREAD, loss=WING_SLIP)
+ROLLED = Mode(Cause.WING, WING_ODDS, WING_SLIP)
 """Beside these where the glider has just begun to roll otherwise, which little else does. ``size`` is of
-slip, and no lost wing makes a glider faster."""
+slip."""
+LOST = Mode(Cause.WING, WING_ODDS, LOST_SPREAD, loss=LOST_SLIP)
+"""The same where it rolls so far that it must be a lost wing, which makes no glider faster."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,6 +27,7 @@ from gliderwatch.estimation.constants import (
     OWN_SURE,
     RETRIMMED,
     ROLL_CONFIRMS,
+    ROLL_LOST,
     ROLL_STEP,
     SLACK,
     TURNED,
@@ -38,7 +39,7 @@ from gliderwatch.estimation.dive_measurement import slip_at
 from gliderwatch.estimation.kalman import JointInfo, JointParams, JointState
 from gliderwatch.estimation.kinematic_speed import KinematicSpeed, Ratios, kinematic_speed
 from gliderwatch.estimation.kinematic_speed import learn as learn_ratios
-from gliderwatch.estimation.modes import Cause
+from gliderwatch.estimation.modes import LOST, ROLLED, Cause
 from gliderwatch.estimation.speed_range import (
     Normal,
     RangeParams,
@@ -229,13 +230,13 @@ def step(
     at = setting(dive.features)
     learnt = speed_range(state.normal, at, params.learning) if params.learning else None
     normal = learnt or SpeedRange(params.low, (params.low + params.high) / 2, params.high, 0)
-    rolled = state.rolled + 1 if _rolls(state, dive) else 0
+    roll = _roll_step(state, dive)
+    rolled = state.rolled + 1 if roll > ROLL_STEP else 0
     usual = learnt.usual if learnt else None
     # the first of two dives may have been half over when it happened
+    hint = (LOST if roll > ROLL_LOST else ROLLED) if 1 <= rolled <= 2 else None
     kinematic = kinematic_speed(state.ratios, dive.features)
-    estimate, info = kalman.step(
-        state.filter, dive, params.joint, usual, hint=1 <= rolled <= 2, kinematic=kinematic
-    )
+    estimate, info = kalman.step(state.filter, dive, params.joint, usual, hint, kinematic)
     if info is None:
         flag, reason = _of_reckoning_alone(state, dive, kinematic, normal, params)
         return state, Verdict(flag, reason, normal, None)
@@ -431,12 +432,12 @@ def _how_slow(
     return words
 
 
-def _rolls(state: SpeedState, dive: Dive) -> bool:
-    """Whether the roll of a dive differs much from the usual one."""
+def _roll_step(state: SpeedState, dive: Dive) -> float:
+    """By how much (rad) the roll of a dive differs from the usual one; 0 where either is not known."""
     roll = dive.features.roll_mean
     if roll is None or dive.n_samples < BASELINE_LEAST or len(state.rolls) < BASELINE_LEAST:
-        return False
-    return abs(roll - median(state.rolls)) > ROLL_STEP
+        return 0.0
+    return abs(roll - median(state.rolls))
 
 
 def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: SpeedParams) -> SpeedState:
