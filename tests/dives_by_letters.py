@@ -71,11 +71,16 @@ class Talk:
 
     def __init__(self, reminder_hours: float | None = 24.0, notices: bool = False) -> None:
         self.notified, self.alerts = NotificationState(), list[Alert]()
-        self.reminder_hours, self.notices = reminder_hours, notices
+        self.reminder_hours, self.notices, self.now = reminder_hours, notices, 0.0
 
-    def update(self, world: World | str) -> list[str]:
-        """The kinds of the messages that a world leads to now."""
-        now = World.of(world) if isinstance(world, str) else world
-        self.notified, new = due_notifications(self.notified, now, self.reminder_hours, self.notices)
+    def update(self, world: World | str, minutes: float = 60.0) -> list[str]:
+        """The kinds of the messages that a world leads to, so long after the last look at it or its last
+        surfacing, whichever is later."""
+        facts = World.of(world) if isinstance(world, str) else world
+        latest = facts.last_surfacing(float("inf"))
+        self.now = max(self.now, 0.0 if latest is None else latest.t_surface) + 60 * minutes
+        self.notified, new = due_notifications(
+            self.notified, facts, self.reminder_hours, self.notices, now=self.now
+        )
         self.alerts += map(render, new)
         return [str(a.kind) for a in new]

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from gliderwatch.incidents.acknowledgement import acknowledge_thread
-from gliderwatch.incidents.notifications import unacknowledged
+from gliderwatch.incidents.open_threads import unacknowledged
 from gliderwatch.model import Alert, Kind, SegmentId, Severity
 from gliderwatch.params import GliderParams
 from gliderwatch.service import judgement, transaction

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gliderwatch.incidents.notices import Unjudged
-from gliderwatch.incidents.notifications import NotificationState, unacknowledged
+from gliderwatch.incidents.notifications import NotificationState
+from gliderwatch.incidents.open_threads import unacknowledged
 from gliderwatch.incidents.overdue import Sign
 from gliderwatch.incidents.unjudged import UnjudgedThread, announce, blindness
 from gliderwatch.messages.notice_text import render

@@ -15,7 +15,7 @@ from gliderwatch.export.dives import assessment_line, iso_ms
 from gliderwatch.incidents.acknowledgement import Ack, Acks, acknowledge, acknowledge_thread, with_mute
 from gliderwatch.incidents.constants import GONE, RECENT
 from gliderwatch.incidents.notices import Acknowledged, Irregularity, Notice
-from gliderwatch.incidents.notifications import OpenThread, open_threads
+from gliderwatch.incidents.open_threads import OpenThread, open_threads
 from gliderwatch.incidents.overdue import ExpectedCall, expected_call, guess, is_launched
 from gliderwatch.messages import irregularity_text
 from gliderwatch.messages.formatting import clean

@@ -14,7 +14,7 @@ from gliderwatch.cli.status import GliderStatus, IncidentEntry, Overview
 from gliderwatch.config import Problem
 from gliderwatch.export.dives import iso_ms
 from gliderwatch.incidents.acknowledgement import Ack
-from gliderwatch.incidents.notifications import OpenThread
+from gliderwatch.incidents.open_threads import OpenThread
 from gliderwatch.messages import irregularity_text
 from gliderwatch.messages.formatting import clean, duration, place, utc
 from gliderwatch.model import Alert, Assessment, Flag, Incident, Kind, Severity

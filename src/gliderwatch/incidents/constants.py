@@ -30,6 +30,9 @@ NEIGHBOURS_AGAIN = 7 * 86400.0
 count."""
 SPEED_CHANGE = 0.05
 """m/s: a smaller change of a speed that was reported is not worth a correction."""
+SETTLES = 3600.0
+"""s after a message about an incident within which a change of mind waits for the next: files of one call,
+and the final current of a dive (10 to 40 min after it), come within the hour."""
 FLOW_CHANGE = 0.05
 """m/s, a component: the same for the reference flow."""
 MESSAGE_LATE = 900.0

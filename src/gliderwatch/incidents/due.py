@@ -16,12 +16,8 @@ from gliderwatch.incidents.acknowledgement import Acks
 from gliderwatch.incidents.constants import GONE
 from gliderwatch.incidents.facts import informed
 from gliderwatch.incidents.notices import Irregularity, Notice
-from gliderwatch.incidents.notifications import (
-    IncidentFacts,
-    NotificationState,
-    due_notifications,
-    unacknowledged,
-)
+from gliderwatch.incidents.notifications import IncidentFacts, NotificationState, due_notifications
+from gliderwatch.incidents.open_threads import unacknowledged
 from gliderwatch.incidents.overdue import SilenceFacts
 from gliderwatch.incidents.unjudged import WatchFacts
 from gliderwatch.layers.advice import LayerAdvice
@@ -87,6 +83,7 @@ def due(before: NotificationState, facts: GliderFacts, wanted: Wanted, findings:
         acks,
         findings.advice,
         findings.layers,
+        now,
     )
     unknown, of_watch = unjudged.announce(notified.unknown, facts, wanted.attention, hours, now)
     ids, of_files = irregularities.due(before.irregularities, facts.irregularities(now), now)

@@ -51,11 +51,12 @@ NOTHING_ELSE = Situation()
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """An incident opened at the surfacing of a dive."""
+    """An incident opened at the surfacing of a dive; it takes the place of the one reported ``before``."""
 
     incident: Incident
     dive: Assessment
     situation: Situation = NOTHING_ELSE
+    before: Incident | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,11 +71,13 @@ class StillOpen:
 
 @dataclass(frozen=True, slots=True)
 class Cleared:
-    """An incident is over; ``dive`` cleared it. The others of the ``situation`` go on."""
+    """An incident is over; ``dive`` cleared it. The others of the ``situation`` go on. ``is_first``: it was
+    over before anybody could be notified of it."""
 
     incident: Incident
     dive: Assessment
     situation: Situation = NOTHING_ELSE
+    is_first: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Protocol
 
 from gliderwatch.fleet.advice import Advice
 from gliderwatch.incidents.aborts import Episode
-from gliderwatch.incidents.acknowledgement import Acks, is_acknowledged
-from gliderwatch.incidents.calls import SEVERAL, CallsWithoutFile
-from gliderwatch.incidents.constants import FLOW_CHANGE, NEWS, REGIME_DIVES, SPEED_CHANGE
+from gliderwatch.incidents.acknowledgement import Acks
+from gliderwatch.incidents.calls import CallsWithoutFile
+from gliderwatch.incidents.constants import FLOW_CHANGE, NEWS, REGIME_DIVES, SETTLES, SPEED_CHANGE
 from gliderwatch.incidents.facts import Facts, last_dives, next_surfacing, situation
 from gliderwatch.incidents.health import HealthThread
 from gliderwatch.incidents.neighbours import Comparison
@@ -44,8 +43,9 @@ NO_ACKS: Acks = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class Thread:
-    """The messages of one incident: the incident as last ``reported``, the ``dive`` in that message, how many
-    ``messages`` so far, and the latest surfacing at the last one (``time``, s)."""
+    """The messages of one incident: it as last ``reported``, the ``dive`` in that message, how many
+    ``messages`` so far, the latest surfacing at the last one (``time``), when that was made
+    (``reported_at``, both s), and the ids of the incidents of which the thread was ``formerly``."""
 
     id: str
     reported: Incident
@@ -53,6 +53,13 @@ class Thread:
     messages: int
     time: float
     withdrawn: bool = False
+    reported_at: float = 0.0
+    formerly: tuple[str, ...] = ()
+
+    @property
+    def is_open(self) -> bool:
+        """Whether people take the incident for open."""
+        return self.reported.cleared_at is None and not self.withdrawn
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +71,7 @@ class NotificationState:
     aborts (`incidents.aborts`), ``empty`` of calls without a file (`incidents.calls`), ``neighbours`` how it
     stood to them (`incidents.neighbours`), ``irregularities`` the ids of those of its files, ``renewed`` the
     dive (s) of the last notice of a new way of flying, ``health`` what rules of health found
-    (`incidents.health`).
+    (`incidents.health`). ``settles`` is when a change that waits is reported (s; None: none waits).
     """
 
     threads: tuple[Thread, ...] = ()
@@ -77,6 +84,7 @@ class NotificationState:
     neighbours: Comparison | None = None
     renewed: float | None = None
     health: tuple[HealthThread, ...] = ()
+    settles: float | None = None
 
 
 class IncidentFacts(Facts, Protocol):
@@ -94,32 +102,19 @@ def due_notifications(
     acks: Acks = NO_ACKS,
     advice: tuple[tuple[str, Advice], ...] = (),
     layers: LayerAdvice | None = None,
+    now: float = 0.0,
 ) -> tuple[NotificationState, list[Notice]]:
     """What people were notified of after the messages that are due now, and these messages.
 
     `notices`: whether anyone wants a notice of each surfacing. An incident that somebody has acknowledged
     (`acks`) has no reminders, unless it has grown worse since. `advice`: where to look next, by the
-    name of the field; `layers`: how deep to fly next.
+    name of the field; `layers`: how deep to fly next. `now` (s) is when the messages are made.
     """
     latest, before_it = [*last_dives(facts, 2), None, None][:2]
     if latest is None:
         return notified, []
-    threads: list[Thread] = []
-    alerts: list[Notice] = []
-    incidents = facts.incidents()
-    matched = _matched(notified.threads, incidents)
-    for before in notified.threads:
-        now = matched.get(before.id)
-        hours = None if now is not None and _holds_acknowledgement(before, now, acks) else reminder_hours
-        thread, more = _continued(before, now, facts, latest, hours)
-        threads.append(thread)
-        alerts += more
-    old = {i.id for i in matched.values()}
-    for incident in sorted(incidents, key=lambda i: (i.opened_at, i.id)):
-        if incident.id not in old and _is_news(incident, latest):
-            thread, more = _opened(incident, facts, latest, {t.id for t in threads})
-            threads.append(thread)
-            alerts += more
+    moment = _Moment(facts, latest, max(now, latest.t_surface), reminder_hours, acks)
+    threads, alerts, settles = _of_incidents(notified.threads, moment)
     renewed, more = _new_regime(notified.renewed, facts, latest)
     alerts += more
     surfaced = notified.surfaced
@@ -132,8 +127,83 @@ def due_notifications(
             Notice(identity, "", latest.glider, latest.t_surface, Kind.SURFACING, info, info, content)
         )
         surfaced = latest.t_surface
-    notified = replace(notified, threads=tuple(threads), surfaced=surfaced, renewed=renewed)
+    notified = replace(notified, threads=threads, surfaced=surfaced, renewed=renewed, settles=settles)
     return notified, sorted(alerts, key=lambda a: a.time)
+
+
+def settled_changes(
+    notified: NotificationState, facts: IncidentFacts, acks: Acks, now: float
+) -> tuple[NotificationState, list[Notice]]:
+    """As `due_notifications`, of the changes alone that have waited until `now` (s), without new input."""
+    if notified.settles is None or now < notified.settles:
+        return notified, []
+    return due_notifications(notified, facts, None, False, acks, now=now)
+
+
+@dataclass(frozen=True, slots=True)
+class _Moment:
+    """What decides on the messages that are due: the ``latest`` dive, the time ``now`` (s)."""
+
+    facts: IncidentFacts
+    latest: Assessment
+    now: float
+    reminder_hours: float | None
+    acks: Acks
+
+
+def _of_incidents(
+    before: tuple[Thread, ...], moment: _Moment
+) -> tuple[tuple[Thread, ...], list[Notice], float | None]:
+    """The threads after the messages that are due, these, and when a change that waits is reported (s)."""
+    incidents = tuple(sorted(moment.facts.incidents(), key=lambda i: (i.opened_at, i.id)))
+    matched = matched_incidents(before, incidents)
+    unreported = _unreported(before, matched, incidents, moment.latest)
+    threads, notices, settles = list[Thread](), list[Notice](), list[float]()
+    for thread in before:
+        incident = matched.get(thread.id)
+        another = next((i for i in unreported if i.cleared_at is None), None)
+        if another is not None and thread.is_open and (incident is None or incident.cleared_at is not None):
+            unreported.remove(another)
+            after, more = _succeeded(thread, another, moment)
+        else:
+            after, more = _continued(thread, incident, moment)
+            if more and _can_wait(thread, after, more[0]) and moment.now - thread.reported_at < SETTLES:
+                settles.append(thread.reported_at + SETTLES)
+                after, more = thread, []
+        threads.append(after)
+        notices += more
+    for incident in unreported:
+        thread, more = _opened(incident, moment, {t.id for t in threads})
+        threads.append(thread)
+        notices += more
+    return tuple(threads), notices, min(settles, default=None)
+
+
+def _unreported(
+    threads: Iterable[Thread],
+    matched: Mapping[str, Incident],
+    incidents: Sequence[Incident],
+    latest: Assessment,
+) -> list[Incident]:
+    """The incidents that are news and that no thread is or was about.
+
+    Measurements that disagreed until an anomaly opened are no incident beside it: it explains them.
+    """
+    reported = {i.id for i in matched.values()} | {identity for t in threads for identity in t.formerly}
+    explained = {i.opened_at for i in incidents if i.kind is Kind.ANOMALY}
+    return [
+        i
+        for i in incidents
+        if i.id not in reported
+        and _is_news(i, latest)
+        and not (i.kind is Kind.FALSE_ALARM and i.cleared_at in explained)
+    ]
+
+
+def _can_wait(before: Thread, after: Thread, notice: Notice) -> bool:
+    """Whether a message is a change of mind that may wait: that an incident is open is none, nor a
+    reminder."""
+    return notice.kind is not Kind.REMINDER and (before.is_open or not after.is_open)
 
 
 def _new_regime(
@@ -158,65 +228,6 @@ def _new_regime(
     return renewed, []
 
 
-def unacknowledged(
-    notified: NotificationState, incidents: tuple[Incident, ...], acks: Acks
-) -> frozenset[str]:
-    """The threads of what is open and nobody has acknowledged: incidents, and gliders that stay away, cannot
-    be judged, have aborted, call and send nothing, or differ from their neighbours."""
-    matched = _matched(notified.threads, incidents)
-    threads = {
-        thread.id
-        for thread in notified.threads
-        if (now := matched.get(thread.id)) is not None
-        and now.cleared_at is None
-        and not _holds_acknowledgement(thread, now, acks)
-    }
-    if notified.unknown is not None and not notified.unknown.is_over:
-        threads.add(notified.unknown.id)
-    threads |= {t.id for t in open_threads(notified) if not is_acknowledged(acks, (t.id,), t.severity)}
-    if notified.neighbours is not None and notified.neighbours.id:
-        threads.add(notified.neighbours.id)
-    return frozenset(threads | {silence.id for silence in notified.silences if silence.called is None})
-
-
-@dataclass(frozen=True, slots=True)
-class OpenThread:
-    """What goes on and is no incident of dives: an abort, calls without a file, what a rule of health found.
-
-    ``since`` (s); ``about`` in a few words.
-    """
-
-    id: str
-    kind: Kind
-    severity: Severity
-    since: float
-    about: str
-
-    @property
-    def glider(self) -> str:
-        """Whose it is."""
-        return self.id.split("/", 1)[0]
-
-
-def open_threads(notified: NotificationState) -> tuple[OpenThread, ...]:
-    """The aborts, calls without a file and findings of health that were reported and go on."""
-    aborts = (
-        OpenThread(e.id, Kind.ABORT, e.severity, e.reports[0].t, e.reports[0].cause or str(e.reports[0].what))
-        for e in notified.aborts
-        if e.cleared is None and e.reports
-    )
-    health = (
-        OpenThread(t.id, Kind.HEALTH, t.reported.severity, t.reported.since, t.reported.last.text)
-        for t in notified.health
-        if not t.is_over
-    )
-    empty, found = notified.empty, list[OpenThread]()
-    if empty is not None and not empty.is_over:
-        severity = Severity.INFO if empty.reported < SEVERAL else Severity.WARNING
-        found = [OpenThread(empty.id, Kind.CALL, severity, empty.since, f"{empty.reported} without a file")]
-    return (*aborts, *found, *health)
-
-
 def as_notified(notified: NotificationState, facts: IncidentFacts) -> NotificationState:
     """What people were notified of, after all dives were assessed again by other code or parameters.
 
@@ -227,11 +238,10 @@ def as_notified(notified: NotificationState, facts: IncidentFacts) -> Notificati
     latest, incidents = facts.last_surfacing(float("inf")), facts.incidents()
     if latest is None:
         return notified
-    matched, threads = _matched(notified.threads, incidents), list[Thread]()
+    matched, threads = matched_incidents(notified.threads, incidents), list[Thread]()
     for thread in notified.threads:
         now = matched.get(thread.id)
-        was_open = thread.reported.cleared_at is None and not thread.withdrawn
-        if was_open != (now is not None and now.cleared_at is None):
+        if thread.is_open != (now is not None and now.cleared_at is None):
             threads.append(thread)
         elif now is None:
             threads.append(replace(thread, withdrawn=True))
@@ -245,7 +255,7 @@ def as_notified(notified: NotificationState, facts: IncidentFacts) -> Notificati
     return replace(notified, threads=tuple(threads), renewed=latest.t_dive)
 
 
-def _holds_acknowledgement(thread: Thread, now: Incident, acks: Acks) -> bool:
+def holds_acknowledgement(thread: Thread, now: Incident, acks: Acks) -> bool:
     """Whether somebody has acknowledged an incident, as bad as it is; late data may have changed its id."""
     ack = acks.get(now.id) or acks.get(thread.id)
     return ack is not None and ack.holds(now)
@@ -257,7 +267,7 @@ def _is_another(dive: Assessment, surfaced: float | None) -> bool:
     return surfaced is None or (dive.t_dive + dive.t_surface) / 2 > surfaced
 
 
-def _matched(threads: Iterable[Thread], incidents: tuple[Incident, ...]) -> dict[str, Incident]:
+def matched_incidents(threads: Iterable[Thread], incidents: tuple[Incident, ...]) -> dict[str, Incident]:
     """For each thread the incident that it is about now: the one reported, else one of its kind and time."""
     return by_thread({t.id: t.reported for t in threads}, incidents, _overlaps)
 
@@ -275,52 +285,52 @@ def _is_news(incident: Incident, latest: Assessment) -> bool:
     return incident.cleared_at is None or latest.t_surface - incident.cleared_at < NEWS
 
 
-def _opened(
-    incident: Incident, facts: IncidentFacts, latest: Assessment, used: set[str]
-) -> tuple[Thread, list[Notice]]:
-    identity = thread_id(incident.id, used)
-    thread = Thread(identity, incident, incident.last, 0, latest.t_surface)
-    content = Opened(incident, incident.last, situation(facts, incident.id))
-    thread, alerts = _message(thread, content, latest)
+def _opened(incident: Incident, moment: _Moment, used: set[str]) -> tuple[Thread, list[Notice]]:
+    """The thread of an incident, with its first message: of one that is over already that is its end."""
+    thread = Thread(thread_id(incident.id, used), incident, incident.last, 0, moment.latest.t_surface)
     if incident.cleared_at is not None:
-        thread, more = _message(thread, _cleared(incident, facts), latest)
-        alerts += more
-    return thread, alerts
+        return _message(thread, _cleared(incident, moment.facts, is_first=True), moment)
+    return _message(thread, Opened(incident, incident.last, situation(moment.facts, incident.id)), moment)
 
 
-def _cleared(incident: Incident, facts: IncidentFacts) -> Cleared:
+def _succeeded(thread: Thread, incident: Incident, moment: _Moment) -> tuple[Thread, list[Notice]]:
+    """A thread whose incident is over or gone, while another is open that nobody was notified of: one message
+    says what is so now."""
+    before = thread.reported
+    content = Opened(incident, incident.last, situation(moment.facts, incident.id), before)
+    after, notices = _message(thread, content, moment)
+    return replace(after, formerly=(*thread.formerly, before.id)), notices
+
+
+def _cleared(incident: Incident, facts: IncidentFacts, *, is_first: bool = False) -> Cleared:
     """That an incident is over, with the dive that cleared it and the incidents that go on."""
     dive = facts.last_surfacing(incident.cleared_at if incident.cleared_at is not None else float("inf"))
-    return Cleared(incident, dive if dive is not None else incident.last, situation(facts, incident.id))
+    return Cleared(
+        incident, dive if dive is not None else incident.last, situation(facts, incident.id), is_first
+    )
 
 
-def _continued(
-    thread: Thread,
-    now: Incident | None,
-    facts: IncidentFacts,
-    latest: Assessment,
-    reminder_hours: float | None,
-) -> tuple[Thread, list[Notice]]:
-    """One thread after what is so now, and its messages."""
+def _continued(thread: Thread, now: Incident | None, moment: _Moment) -> tuple[Thread, list[Notice]]:
+    """One thread after what is so now, and its message, if one is due."""
+    facts, latest = moment.facts, moment.latest
     dive = facts.dive(thread.dive.t_dive) or facts.last_surfacing(thread.dive.t_surface) or latest
     if now is None:
         if thread.withdrawn:
             return thread, []
-        content = Corrected(
-            thread.reported, None, dive, _why(thread, dive), situation(facts, thread.reported.id)
-        )
-        after, alerts = _message(thread, content, latest)
-        return replace(after, withdrawn=True), alerts
-    was_clear, is_clear = thread.reported.cleared_at is not None, now.cleared_at is not None
-    if is_clear and not was_clear and not thread.withdrawn:
-        return _message(thread, _cleared(now, facts), latest)
+        before = thread.reported
+        content = Corrected(before, None, dive, _why(thread, dive), situation(facts, before.id))
+        after, notices = _message(thread, content, moment)
+        return replace(after, withdrawn=True), notices
+    if now.cleared_at is not None and thread.is_open:
+        return _message(thread, _cleared(now, facts), moment)
     moved = now.since != thread.reported.since or now.cleared_at != thread.reported.cleared_at
     if moved or thread.withdrawn or _changed(thread.dive, dive):
         content = Corrected(thread.reported, now, dive, _why(thread, dive), situation(facts, now.id))
-        return _message(thread, content, latest)
-    if not is_clear and is_reminder_due(now.opened_at, thread.time, latest.t_surface, reminder_hours):
+        return _message(thread, content, moment)
+    is_quiet = now.cleared_at is not None or holds_acknowledgement(thread, now, moment.acks)
+    if not is_quiet and is_reminder_due(now.opened_at, thread.time, latest.t_surface, moment.reminder_hours):
         hours = (latest.t_surface - now.since) / 3600
-        return _message(thread, StillOpen(now, latest, hours, situation(facts, now.id)), latest)
+        return _message(thread, StillOpen(now, latest, hours, situation(facts, now.id)), moment)
     return thread, []
 
 
@@ -348,43 +358,32 @@ def _why(thread: Thread, now: Assessment) -> str:
 
 
 def _message(
-    thread: Thread, content: Opened | StillOpen | Cleared | Corrected, latest: Assessment
+    thread: Thread, content: Opened | StillOpen | Cleared | Corrected, moment: _Moment
 ) -> tuple[Thread, list[Notice]]:
     """The thread after one more message, and the message."""
     dive, before = content.dive, thread.reported
     now = content.now if isinstance(content, Corrected) else content.incident
     severity = Severity.INFO if now is None or isinstance(content, Cleared) else now.severity
     kinds = {StillOpen: Kind.REMINDER, Cleared: Kind.ALL_CLEAR, Corrected: Kind.CORRECTION}
-    kind = kinds.get(type(content), before.kind)
+    kind = kinds.get(type(content), before.kind if now is None else now.kind)
     identity = f"{thread.id}/{thread.messages}"
     notice = Notice(
-        identity, thread.id, dive.glider, dive.t_surface, kind, severity, before.severity, content
+        identity,
+        thread.id,
+        dive.glider,
+        dive.t_surface,
+        kind,
+        severity,
+        max(before.severity, severity),
+        content,
     )
-    return Thread(thread.id, now or before, dive, thread.messages + 1, latest.t_surface), [notice]
-
-
-# ----------------------------------------
-# What the incidents of a glider keep of it when old data are removed.
-
-
-def kept_since(incidents: Iterable[Incident], threads: Iterable[Thread], cut: float) -> float:
-    """The time (s), at the most `cut`, from which on all is kept for incidents that are not over at `cut`."""
-    over = [(i.since, math.inf if i.cleared_at is None else i.cleared_at) for i in incidents]
-    over += [(min(t.reported.since, t.dive.t_dive), ended_at(t)) for t in threads]
-    floor, before = cut, math.inf
-    while floor < before:  # what is kept may reach further back, and then keep more
-        before = floor
-        floor = min([before, *(since for since, end in over if end >= before)])
-    return floor
-
-
-def ended_at(thread: Thread) -> float:
-    """When a thread had its last message (s); infinite while there may be one to come."""
-    if thread.withdrawn:
-        return thread.time
-    return math.inf if thread.reported.cleared_at is None else max(thread.reported.cleared_at, thread.time)
-
-
-def is_removable(incident: Incident, since: float) -> bool:
-    """Whether an incident was over before the time (s) from which on all is kept."""
-    return incident.cleared_at is not None and incident.cleared_at < since
+    after = replace(
+        thread,
+        reported=now or before,
+        dive=dive,
+        messages=thread.messages + 1,
+        time=moment.latest.t_surface,
+        withdrawn=False,
+        reported_at=moment.now,
+    )
+    return after, [notice]

@@ -57,7 +57,7 @@ def opened(glider: str, content: Opened) -> Text:
     is_disagreement = incident.kind is Kind.FALSE_ALARM
     page = Page(
         (
-            _headline(incident, dive, likely),
+            f"{_headline(incident, dive, likely)}{_instead(incident, content.before)}",
             where(dive, is_flow_sure=not is_disagreement),
             next_call(now.expected),
         ),
@@ -69,6 +69,18 @@ def opened(glider: str, content: Opened) -> Text:
         symbols(dive),
     )
     return _title(glider, incident, dive, likely), page
+
+
+def _instead(incident: Incident, before: Incident | None) -> str:
+    """What was reported before, in whose place this incident is now, and why."""
+    if before is None:
+        return ""
+    reported = f" The {_name(before)} reported since {utc(before.since)}"
+    if before.kind is incident.kind:
+        return f"{reported} is over: this is another."
+    if incident.kind is Kind.FALSE_ALARM:
+        return f"{reported} is now more likely a wrong measurement, because {_dives(incident)} contradict it."
+    return f"{reported} is now more likely this, because its speed explains both."
 
 
 def still_open(glider: str, content: StillOpen) -> Text:
@@ -121,6 +133,8 @@ def cleared(glider: str, content: Cleared) -> Text:
         )
         first = f"{name}: {state}, {speed_and_range(dive)}. The {over} is over. {lasted}"
         title = titled(glider, f"ALL CLEAR: {speed_and_range(dive)}")
+    if content.is_first:
+        first += " It is reported only now, because its files came together."
     todo = "Go on with what is still open." if still else "Nothing. Find out why, before you rely on it."
     page = Page(
         (first, where(dive), next_call(content.situation.expected)),

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from gliderwatch.config import Config, Recipient
 from gliderwatch.health.rule import Limits
 from gliderwatch.health.rules import usual_limits
-from gliderwatch.incidents.notifications import NotificationState, unacknowledged
+from gliderwatch.incidents.notifications import NotificationState
+from gliderwatch.incidents.open_threads import unacknowledged
 from gliderwatch.incidents.send_schedule import Standing, Wait, deliveries
 from gliderwatch.model import Alert, Kind, Severity
 from gliderwatch.params import Attention

@@ -17,7 +17,7 @@ from gliderwatch.incidents import overdue
 from gliderwatch.incidents.acknowledgement import with_mute
 from gliderwatch.incidents.due import Findings, Wanted, due
 from gliderwatch.incidents.notices import Fleet, Notice
-from gliderwatch.incidents.notifications import NotificationState
+from gliderwatch.incidents.notifications import NotificationState, settled_changes
 from gliderwatch.incidents.send_schedule import AT_ONCE, Wait
 from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.messages.notice_text import render
@@ -164,18 +164,20 @@ def notify_pilots(
 
 
 def tick(store: Store, glider: str, routing: Routing, others: Iterable[str], now: float) -> tuple[Alert, ...]:
-    """Make the message that a glider is overdue, if it is at `now` (s); `others` are watched as well."""
+    """Report that a glider is overdue, if it is at `now` (s), and changes of incidents that have waited
+    until then; `others` are watched as well."""
     due_at = next_tick(store, glider, routing, now)
     if due_at is None or due_at > now:
         return ()
     with store.transaction():
         notified, hours = store.notified(glider), routing.attention(glider).overdue_hours
         fleet = replace(_fleet(store, others, now), back=_back(store, notified.silences))
-        silences, due = overdue.tick(notified.silences, store.facts(glider), fleet, hours, now)
-        alerts = tuple(map(render, due))
-        if silences != notified.silences:
-            channels = _channels(store, silences, routing)
-            post_alerts(store, glider, replace(notified, silences=silences), alerts, channels, now)
+        facts, acks = store.facts(glider), store.notes.acks(glider)
+        silences, due = overdue.tick(notified.silences, facts, fleet, hours, now)
+        after, settled = settled_changes(replace(notified, silences=silences), facts, acks, now)
+        alerts = tuple(map(render, (*due, *settled)))
+        if after != notified:
+            post_alerts(store, glider, after, alerts, _channels(store, silences, routing), now)
     return alerts
 
 
@@ -224,9 +226,10 @@ def next_tick(store: Store, glider: str, routing: Routing, now: float) -> float 
     attention = with_mute(routing.attention(glider), store.notes.muted_until(glider))
     if attention.recovered:
         return None
-    silences = store.notified(glider).silences
-    facts, hours = store.facts(glider), attention.overdue_hours
-    at = overdue.next_tick(silences, facts, hours, now, _back(store, silences))
+    notified, facts, hours = store.notified(glider), store.facts(glider), attention.overdue_hours
+    at = overdue.next_tick(notified.silences, facts, hours, now, _back(store, notified.silences))
+    if notified.settles is not None:
+        at = notified.settles if at is None else min(at, notified.settles)
     return at if at is None or attention.muted_until is None else max(at, attention.muted_until)
 
 

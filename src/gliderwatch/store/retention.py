@@ -14,7 +14,8 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 
-from gliderwatch.incidents.notifications import NotificationState, ended_at, is_removable, kept_since
+from gliderwatch.incidents.notifications import NotificationState
+from gliderwatch.incidents.open_threads import ended_at, is_removable, kept_since
 from gliderwatch.model import Incident, SegmentId
 from gliderwatch.navigation.clock import is_same
 from gliderwatch.pipeline import GliderState
