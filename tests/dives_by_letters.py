@@ -72,13 +72,16 @@ class Talk:
     def __init__(self, reminder_hours: float | None = 24.0, notices: bool = False) -> None:
         self.notified, self.alerts = NotificationState(), list[Alert]()
         self.reminder_hours, self.notices, self.now = reminder_hours, notices, 0.0
+        self.is_in_time = True
 
     def update(self, world: World | str, minutes: float = 60.0) -> list[str]:
-        """The kinds of the messages that a world leads to, so long after the last look at it or its last
-        surfacing, whichever is later."""
+        """The kinds of the messages that a world leads to, so long after the last look at it, or
+        after its last surfacing if files come in time."""
         facts = World.of(world) if isinstance(world, str) else world
         latest = facts.last_surfacing(float("inf"))
-        self.now = max(self.now, 0.0 if latest is None else latest.t_surface) + 60 * minutes
+        if self.is_in_time and latest is not None:
+            self.now = max(self.now, latest.t_surface)
+        self.now += 60 * minutes
         self.notified, new = due_notifications(
             self.notified, facts, self.reminder_hours, self.notices, now=self.now
         )

@@ -54,7 +54,7 @@ class TestIncidents:
 
 
 class TestAnnouncements:
-    @pytest.mark.parametrize("hours, count", [(22, 2), (26, 0)])
+    @pytest.mark.parametrize("hours, count", [(22, 1), (26, 0)])
     def test_an_incident_that_was_over_for_a_day_is_history(self, hours, count):
         world = World.of("01100")
         last = dive(5, "0", t_dive=dive(4, "0").t_surface, t_surface=dive(4, "0").t_surface + hours * HOUR)

@@ -192,7 +192,7 @@ class TestAsTold:
             ("0110000", "0000000", ["correction"]),  # over, and never was
             ("0110000", "0111000", ["correction"]),  # over, and ended later
             ("0011111", "001S111", ["correction"]),  # open, at another speed
-            ("0000000", "0110000", ["anomaly", "all_clear"]),  # was never told, and is over
+            ("0000000", "0110000", ["all_clear"]),  # was never reported, and is over
             ("0011111", "1111111", ["correction"]),  # open, and began earlier
         ],
     )

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from dives_by_letters import HOUR, STEP, Talk, World, dive
-from gliderwatch.incidents.constants import NEWS
-from gliderwatch.incidents.notifications import NotificationState
-from gliderwatch.model import NextSurfacing, Severity, Unusable
+from gliderwatch.incidents.constants import NEWS, SETTLES
+from gliderwatch.incidents.notifications import NotificationState, settled_changes
+from gliderwatch.model import Kind, NextSurfacing, Severity, Unusable
 
 
 def test_nothing_known_nothing_said():
@@ -30,16 +30,24 @@ def test_the_same_knowledge_leads_to_nothing_more():
     assert talk.update("0110") == [] and talk.notified == notified
 
 
-def test_two_kinds_are_two_threads():
+def test_one_fault_whose_interpretation_changes_is_one_thread_that_says_why():
     talk = Talk()
     talk.update("022")
     talk.update("02211")
-    assert [(a.kind.value, a.severity) for a in talk.alerts] == [
-        ("false_alarm", Severity.WARNING),
-        ("all_clear", Severity.INFO),
-        ("anomaly", Severity.CRITICAL),
+    assert [(a.kind.value, a.severity, a.audience) for a in talk.alerts] == [
+        ("false_alarm", Severity.WARNING, Severity.WARNING),
+        ("anomaly", Severity.CRITICAL, Severity.CRITICAL),
     ]
-    assert len({a.incident for a in talk.alerts}) == 2
+    assert len({a.incident for a in talk.alerts}) == 1
+    body = " ".join(talk.alerts[-1].body.split())
+    assert (
+        "The disagreement of measurements since 1970-01-01 03:00 UTC is now more likely this, because" in body
+    )
+    assert talk.update("02211") == [] and talk.update("0221100") == ["all_clear"]
+
+
+def test_what_disagreed_before_an_anomaly_of_which_all_come_at_once_is_no_message_of_its_own():
+    assert Talk().update("02211") == ["anomaly"]
 
 
 def test_whoever_got_the_alarm_gets_its_end():
@@ -161,19 +169,63 @@ class TestCorrections:
 
     def test_two_incidents_that_turn_out_to_be_one(self):
         talk, world = Talk(), World.of("0110011")
-        assert talk.update(world) == ["anomaly", "all_clear", "anomaly"]
+        assert talk.update(world) == ["anomaly"]
+        assert "is over: this is another" in talk.alerts[-1].body.replace("\n", " ")
         self.change(world, 4, flag=1, speed=0.15)
-        assert talk.update(world) == ["correction", "correction"]
-        titles = [a.title for a in talk.alerts[-2:]]
-        assert sum("withdrawn" in t for t in titles) == 1 and sum("stands" in t for t in titles) == 1
+        assert talk.update(world) == ["correction"] and "stands" in talk.alerts[-1].title
+
+
+class TestChangesWithinTheHour:
+    """A change of mind within the hour after a message waits; an alarm does not."""
+
+    def test_a_dive_that_opens_and_the_next_a_minute_later_that_withdraws_are_one_message(self):
+        talk, world = Talk(), World.of("0110")
+        assert talk.update(world, minutes=1) == ["anomaly"]
+        before = dict(world.dives)
+        world.dives[2 * STEP] = dive(2, "0")
+        assert talk.update(world, minutes=1) == [] and talk.notified.settles == talk.now - 60 + SETTLES
+        world.dives = before
+        assert talk.update(world, minutes=1) == [] and talk.notified.settles is None
+        assert talk.update(world, minutes=90) == []
+
+    def test_what_is_still_so_after_the_hour_is_reported_without_new_input(self):
+        talk, world = Talk(), World.of("0110")
+        talk.update(world, minutes=1)
+        world.dives[2 * STEP] = dive(2, "0")
+        talk.update(world, minutes=20)
+        settles = talk.notified.settles
+        assert settled_changes(talk.notified, world, {}, settles - 1)[1] == []
+        after, (notice,) = settled_changes(talk.notified, world, {}, settles)
+        assert notice.kind is Kind.CORRECTION and after.settles is None
+        assert settled_changes(after, world, {}, settles + 1)[1] == []
+
+    def test_several_changes_are_one_message_of_the_last(self):
+        talk, world = Talk(), World.of("0110")
+        talk.update(world, minutes=1)
+        for speed in (0.05, 0.10, 0.02, 0.08):
+            world.dives[2 * STEP] = dive(2, "1", speed=speed)
+            assert talk.update(world, minutes=10) == []
+        assert talk.update(world, minutes=20) == ["correction"]
+        assert "0.08 m/s" in talk.alerts[-1].title
+
+    def test_an_incident_that_is_open_again_is_reported_at_once(self):
+        talk, world = Talk(), World.of("01100")
+        talk.update("011")
+        assert talk.update(world, minutes=61) == ["all_clear"]
+        world.dives[4 * STEP] = dive(4, "1")
+        assert talk.update(world, minutes=1) == ["correction"] and "stands" in talk.alerts[-1].title
 
 
 class TestHistory:
     def test_what_was_over_for_a_day_when_it_became_known_is_silent(self):
         assert Talk().update("01100" + "0" * 9) == []
 
-    def test_what_ended_today_is_told_with_its_end(self):
-        assert Talk().update("01100" + "0" * 5) == ["anomaly", "all_clear"]
+    def test_what_was_over_when_its_files_came_together_is_one_message_that_says_so(self):
+        talk = Talk()
+        assert talk.update("01100" + "0" * 5) == ["all_clear"]
+        (alert,) = talk.alerts
+        assert (alert.severity, alert.audience) == (Severity.INFO, Severity.CRITICAL)
+        assert "reported only now, because its files came together" in " ".join(alert.body.split())
 
     def test_what_is_still_open_is_told_however_old(self):
         assert Talk().update("011" + "1" * 100) == ["anomaly"]

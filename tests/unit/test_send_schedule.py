@@ -13,7 +13,8 @@ import written
 from alert_support import SLOW, alert, incident
 from dives_by_letters import World
 from gliderwatch.incidents.acknowledgement import acknowledge
-from gliderwatch.incidents.notifications import NotificationState, due_notifications, unacknowledged
+from gliderwatch.incidents.notifications import NotificationState, due_notifications
+from gliderwatch.incidents.open_threads import unacknowledged
 from gliderwatch.incidents.overdue import ExpectedCall, Silence
 from gliderwatch.incidents.send_schedule import AT_ONCE, NO_INCIDENT, Due, QuietHours, Standing, Wait
 from gliderwatch.incidents.send_schedule import due as goes_out

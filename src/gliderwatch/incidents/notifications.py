@@ -158,23 +158,27 @@ def _of_incidents(
     incidents = tuple(sorted(moment.facts.incidents(), key=lambda i: (i.opened_at, i.id)))
     matched = matched_incidents(before, incidents)
     unreported = _unreported(before, matched, incidents, moment.latest)
+    # one is open at the most: an anomaly explains measurements that disagree
+    opened = next((i for i in unreported if i.cleared_at is None), None)
+    over = [i for i in unreported if i.cleared_at is not None]
     threads, notices, settles = list[Thread](), list[Notice](), list[float]()
     for thread in before:
         incident = matched.get(thread.id)
-        another = next((i for i in unreported if i.cleared_at is None), None)
-        if another is not None and thread.is_open and (incident is None or incident.cleared_at is not None):
-            unreported.remove(another)
-            after, more = _succeeded(thread, another, moment)
+        if opened is not None and thread.is_open and (incident is None or incident.cleared_at is not None):
+            after, more = _opened(thread, opened, [*over, thread.reported], moment)
+            opened, over = None, []
         else:
             after, more = _continued(thread, incident, moment)
-            if more and _can_wait(thread, after, more[0]) and moment.now - thread.reported_at < SETTLES:
+            is_fresh = 0 <= moment.now - thread.reported_at < SETTLES  # not before it: a clock set back
+            if more and is_fresh and _can_wait(thread, after, more[0]):
                 settles.append(thread.reported_at + SETTLES)
                 after, more = thread, []
         threads.append(after)
         notices += more
-    for incident in unreported:
-        thread, more = _opened(incident, moment, {t.id for t in threads})
-        threads.append(thread)
+    for incident in over if opened is None else [opened]:
+        thread = Thread(thread_id(incident.id, {t.id for t in threads}), incident, incident.last, 0, 0.0)
+        after, more = _opened(thread, incident, [] if opened is None else over, moment)
+        threads.append(after)
         notices += more
     return tuple(threads), notices, min(settles, default=None)
 
@@ -185,16 +189,18 @@ def _unreported(
     incidents: Sequence[Incident],
     latest: Assessment,
 ) -> list[Incident]:
-    """The incidents that are news and that no thread is or was about.
+    """The incidents that are news: no thread is about them, or was before they were over.
 
     Measurements that disagreed until an anomaly opened are no incident beside it: it explains them.
     """
-    reported = {i.id for i in matched.values()} | {identity for t in threads for identity in t.formerly}
+    reported = {i.id for i in matched.values()}
+    former = {identity for t in threads for identity in t.formerly}
     explained = {i.opened_at for i in incidents if i.kind is Kind.ANOMALY}
     return [
         i
         for i in incidents
         if i.id not in reported
+        and (i.cleared_at is None or i.id not in former)
         and _is_news(i, latest)
         and not (i.kind is Kind.FALSE_ALARM and i.cleared_at in explained)
     ]
@@ -285,21 +291,21 @@ def _is_news(incident: Incident, latest: Assessment) -> bool:
     return incident.cleared_at is None or latest.t_surface - incident.cleared_at < NEWS
 
 
-def _opened(incident: Incident, moment: _Moment, used: set[str]) -> tuple[Thread, list[Notice]]:
-    """The thread of an incident, with its first message: of one that is over already that is its end."""
-    thread = Thread(thread_id(incident.id, used), incident, incident.last, 0, moment.latest.t_surface)
+def _opened(
+    thread: Thread, incident: Incident, former: Sequence[Incident], moment: _Moment
+) -> tuple[Thread, list[Notice]]:
+    """A thread with the first message of an incident: of one that is over already that is its end.
+
+    It takes the place of the ``former`` ones, which are over or gone without a message of that: one message
+    says what is so now.
+    """
+    content: Opened | Cleared = Opened(
+        incident, incident.last, situation(moment.facts, incident.id), former[-1] if former else None
+    )
     if incident.cleared_at is not None:
-        return _message(thread, _cleared(incident, moment.facts, is_first=True), moment)
-    return _message(thread, Opened(incident, incident.last, situation(moment.facts, incident.id)), moment)
-
-
-def _succeeded(thread: Thread, incident: Incident, moment: _Moment) -> tuple[Thread, list[Notice]]:
-    """A thread whose incident is over or gone, while another is open that nobody was notified of: one message
-    says what is so now."""
-    before = thread.reported
-    content = Opened(incident, incident.last, situation(moment.facts, incident.id), before)
+        content = _cleared(incident, moment.facts, is_first=True)
     after, notices = _message(thread, content, moment)
-    return replace(after, formerly=(*thread.formerly, before.id)), notices
+    return replace(after, formerly=(*thread.formerly, *(i.id for i in former))), notices
 
 
 def _cleared(incident: Incident, facts: IncidentFacts, *, is_first: bool = False) -> Cleared:

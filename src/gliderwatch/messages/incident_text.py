@@ -75,7 +75,7 @@ def _instead(incident: Incident, before: Incident | None) -> str:
     """What was reported before, in whose place this incident is now, and why."""
     if before is None:
         return ""
-    reported = f" The {_name(before)} reported since {utc(before.since)}"
+    reported = f" The {_name(before)} since {utc(before.since)}"
     if before.kind is incident.kind:
         return f"{reported} is over: this is another."
     if incident.kind is Kind.FALSE_ALARM:
