@@ -301,6 +301,32 @@ class TestSilence:
         assert clock.at(DUE + HOUR) == ["correction"]
         assert "in time" in clock.alerts[-1].title and clock.alerts[-1].time == DUE + HOUR
 
+    def test_a_file_that_comes_as_the_call_ends_did_not_come_late(self):
+        """It surfaced 2 min before it was overdue, its file came 5 min later: it was late itself."""
+        clock = self.clock()
+        clock.at(DUE)
+        clock.sea.call(DUE - 120, at=DUE + 180)
+        clock.sea.files[-1] = replace(clock.sea.files[-1], last_t=DUE - 120)
+        assert clock.at(DUE + 180) == ["all_clear"]
+        assert "came late" not in clock.alerts[-1].body
+        assert clock.at(DUE + 2 * HOUR) == []
+
+    def test_what_has_called_by_then_is_not_still_overdue(self):
+        clock = self.clock()
+        clock.at(DUE)
+        second = T0 + INTERVAL + 2 * MARGIN
+        clock.sea.call(second - HOUR)
+        assert clock.at(second) == ["all_clear"]
+        assert clock.alerts[-1].time == second - HOUR
+
+    def test_its_all_clear_says_what_is_still_open(self):
+        clock = self.clock()
+        clock.at(DUE)
+        clock.sea.open = (incident(),)
+        clock.sea.call(DUE + HOUR)
+        assert clock.at(DUE + 2 * HOUR) == ["all_clear"]
+        assert "But not all is well: the anomaly since 2022" in " ".join(clock.alerts[-1].body.split())
+
     def test_newest_first(self):
         """The newest file says that it is over, the older ones that it never was."""
         clock = self.clock()

@@ -201,13 +201,14 @@ class Overdue:
 class CalledAgain:
     """The first sign of life, ``at`` (s), since the ``last_sign`` before (s); ``last`` is its last dive that
     ended, ``expected`` the next surfacing. ``for_all``: the notice that it stayed away stood for all gliders,
-    because none called."""
+    because none called. ``incidents`` are those that are open."""
 
     last_sign: float
     at: float
     last: Assessment | None
     for_all: bool
     expected: NextSurfacing | None = None
+    incidents: tuple[Incident, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -251,17 +251,19 @@ def _on_calls(before: Silence, facts: SilenceFacts, now: float) -> tuple[Silence
         return before, None
     call = before.missed
     at = first_call(call, facts.signs(call.last_sign - RECENT), facts.first_surfacing(call.last_sign), now)
-    if at is None or (before.called is not None and at > call.due):
+    if at is None or (before.called is not None and at > min(call.due, before.called - 1.0)):
         return before, None
     if not before.messages:  # nobody was notified of this one
         return replace(before, called=at, withdrawn=at <= call.due), None
-    silence = replace(before, messages=before.messages + 1, called=at, withdrawn=at <= call.due)
+    is_late = now - at > LONGEST_CALL  # its files: what comes as a call ends is a glider that was late itself
+    silence = replace(before, messages=before.messages + 1, called=at, withdrawn=at <= call.due and is_late)
     if silence.withdrawn:
         return silence, _notice(before, facts.glider, now, Kind.CORRECTION, CalledInTime(call.due, at))
     last = facts.last_surfacing(now)
     expected = None if last is None else next_surfacing(facts, last)
     expected = None if expected is None or expected.t <= at else expected
-    content = CalledAgain(call.last_sign, at, last, before.shore == before.id, expected)
+    still = tuple(i for i in facts.incidents() if i.cleared_at is None)
+    content = CalledAgain(call.last_sign, at, last, before.shore == before.id, expected, still)
     return silence, _notice(before, facts.glider, at, Kind.ALL_CLEAR, content)
 
 

@@ -60,10 +60,18 @@ def called_again(glider: str, content: CalledAgain) -> Text:
     silent = duration(content.at - content.last_sign)
     first = f"{name_of(glider)} calls again: {utc(content.at)}, after {silent} of silence. "
     first += "It is not overdue any more."
+    still = " and ".join(f"the {INCIDENTS[i.kind]} since {utc(i.since)}" for i in content.incidents)
+    first += f" But not all is well: {still} is still open." if still else ""
     page = Page(
         (first, where(content.last), next_call(content.expected), *((_EACH,) if content.for_all else ())),
         (("Silent", f"{utc(content.last_sign)} to {utc(content.at)}"), *_last(content.last)),
-        do=("Nothing; its dives are judged as its files come.",),
+        do=(
+            (
+                "Go on with what is still open."
+                if still
+                else "Nothing; its dives are judged as its files come."
+            ),
+        ),
     )
     return titled(glider, f"ALL CLEAR: calls again after {silent}"), page
 
