@@ -105,7 +105,7 @@ lock: ## choose the newest packages anew and write both lock files
 	build/uv/bin/uv pip compile $(UV_FLAGS) $(EXTRAS) pyproject.toml -o requirements.lock
 	build/uv/bin/uv pip compile $(UV_FLAGS) $(EXTRAS) -c requirements.lock --group dev pyproject.toml -o requirements-dev.lock
 
-EXTRAS = --extra ais --extra archive --extra maps --extra web
+EXTRAS = --extra ais --extra archive --extra maps --extra relays --extra web
 UV_FLAGS = --no-config --quiet --upgrade --universal --python-version 3.11 --only-binary :all: \
 	--generate-hashes --custom-compile-command "make lock"
 

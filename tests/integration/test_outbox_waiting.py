@@ -276,7 +276,7 @@ class TestRefused:
             "ALTER TABLE outbox DROP COLUMN delivery; ALTER TABLE files DROP COLUMN hindrance;"
             "DROP INDEX files_by_segment; DROP TABLE calls; DROP TABLE health; DROP TABLE field_settings;"
             "DROP TABLE field_batches; DROP TABLE field_checkpoints; DROP TABLE field_soundings;"
-            "DROP TABLE field_advice; DROP TABLE layers;"
+            "DROP TABLE field_advice; DROP TABLE layers; DROP TABLE relays;"
             "PRAGMA user_version = 4;"
         )
         assert [u.alert for u in store.refused(0.0)] == ["1", "2", "4"]

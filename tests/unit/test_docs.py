@@ -27,7 +27,7 @@ from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
 from gliderwatch.store.conversion import ROW_CONVERTERS
-from gliderwatch.store.database import MIGRATIONS, schema
+from gliderwatch.store.database import MIGRATIONS, crc_of_batch, schema
 from gliderwatch.store.state_file import Status
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -149,6 +149,7 @@ def test_queries_fit_the_schema() -> None:
     db = sqlite3.connect(":memory:")
     for name in ROW_CONVERTERS:
         db.create_function(name, 1, lambda text: text)
+    db.create_function("crc_of_batch", 2, crc_of_batch)
     for script in (schema(), *MIGRATIONS.values()):
         db.executescript(script)
     for statement in statements:

@@ -428,7 +428,7 @@ def test_a_state_of_an_earlier_release_is_read_but_not_written(config: Config, t
             "ALTER TABLE outbox DROP COLUMN delivery; ALTER TABLE files DROP COLUMN hindrance;"
             "DROP INDEX files_by_segment; DROP TABLE calls; DROP TABLE health; DROP TABLE field_settings;"
             "DROP TABLE field_batches; DROP TABLE field_checkpoints; DROP TABLE field_soundings;"
-            "DROP TABLE field_advice; DROP TABLE layers;"
+            "DROP TABLE field_advice; DROP TABLE layers; DROP TABLE relays;"
         )
     assert [u.held_until for u in overview(config).undelivered] == [0.0]
     assert failing(path, NOW) == {}

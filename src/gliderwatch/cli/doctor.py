@@ -282,6 +282,7 @@ def examine(path: Path, *, send: bool = False) -> Iterator[Finding]:
     yield from _safely("disk", lambda: disk(config, least))
     yield from _safely("state", lambda: doctor_checks.state(config, problems))
     yield from _safely("channels", lambda: doctor_checks.channels(config, problems, send))
+    yield from _safely("relays", lambda: doctor_checks.relays(config, problems))
     yield from _safely("heartbeat", lambda: doctor_checks.sign(config, problems))
     yield from _safely("service", lambda: doctor_checks.daemon(config))
 

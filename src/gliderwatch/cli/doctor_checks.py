@@ -16,17 +16,20 @@ from typing import Any
 
 from gliderwatch.config import Config, Problem, expand
 from gliderwatch.delivery.channels import DeliveryError
+from gliderwatch.delivery.mqtt import reach
 from gliderwatch.errors import ConfigError, DamagedError, GliderwatchError, MissingCache, StateError
 from gliderwatch.messages import notice_text
 from gliderwatch.messages.formatting import clean, duration
 from gliderwatch.messages.samples import sample
 from gliderwatch.model import Alert, Kind, Severity
 from gliderwatch.service.liveness import STALE, is_held, seconds_silent
+from gliderwatch.service.relays import relay_settings
 from gliderwatch.slocum.caches import Staging, lists_folder
 from gliderwatch.slocum.cycles import parse_sensor_list
 from gliderwatch.slocum.folders import Found, find_places, scan
 from gliderwatch.slocum.header import Header, parse_header, plain, read_header, read_regular
 from gliderwatch.store.database import SCHEMA
+from gliderwatch.store.relays import exchange
 from gliderwatch.store.watch_health import Failing, failing, quick_check, schema_version
 
 # ----------------------------------------
@@ -398,6 +401,31 @@ def sign(config: Config, problems: Iterable[Problem]) -> Findings:
     if not found and (settings.url is not None or settings.file is not None):
         found = [ok("heartbeat", f"every {settings.minutes:g} min while all is well")]
     yield from found
+
+
+def relays(config: Config, problems: Iterable[Problem]) -> Findings:
+    """Whether the broker of the relays lets this one in, and how the exchange stands."""
+    found = of_check("relays", problems, "relays.", "fields.")
+    yield from found
+    if config.relays.broker is None or any(f.level == Level.ERROR for f in found):
+        return
+    settings = relay_settings(config)
+    assert settings is not None
+    place, path = settings.broker.place, Path(config.state.path)
+    try:
+        refused = reach(settings.broker)
+    except GliderwatchError as problem:
+        refused = str(problem)
+    if refused is not None:
+        cure = "does the broker run there, and do user, password and certificate suit it?"
+        yield error("relays", f"{place} lets nobody in: {refused}", cure)
+    else:
+        yield ok("relays", f"{place} answers; this relay is {settings.name}")
+    others = exchange(path).others if path.exists() else {}
+    for name, (_, other) in others.items():
+        for apart in other.apart:
+            text = f"field {apart} has other settings at {name}, or is not here: it is not exchanged"
+            yield warning("relays", text, "give box, depth, sensor and estimator alike at all relays")
 
 
 def sample_for(kind: str) -> Alert:

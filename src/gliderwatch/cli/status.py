@@ -25,6 +25,7 @@ from gliderwatch.params import Attention
 from gliderwatch.service.liveness import STALE, is_held, seconds_silent
 from gliderwatch.service.routing import channels, post_alert, withdraw_answered
 from gliderwatch.slocum.folders import Link
+from gliderwatch.store.relays import RelayState
 from gliderwatch.store.state_file import File, Status, Store, Undelivered
 
 # ----------------------------------------
@@ -268,7 +269,8 @@ class Overview:
     """All that `status` tells: whether the daemon is ``running``, since when it is silent (s; None: ever).
 
     ``held`` are messages that are to wait; ``undelivered`` those that should have been delivered.
-    ``links`` stand where the folders of gliders should be of which nothing is known.
+    ``links`` stand where the folders of gliders should be of which nothing is known. ``relays``: how
+    the exchange with other dockservers stands; None: there is none.
     """
 
     running: bool
@@ -281,6 +283,7 @@ class Overview:
     undelivered: tuple[Undelivered, ...]
     held: tuple[Undelivered, ...] = ()
     links: dict[str, Link] = field(default_factory=dict)
+    relays: RelayState | None = None
 
     @property
     def alive(self) -> bool:
@@ -309,6 +312,7 @@ def overview(config: Config) -> Overview:
                 undelivered=(*(u for u in waiting if u.held_until <= now), *store.refused(now - WEEK)),
                 held=tuple(u for u in waiting if u.held_until > now),
                 links=linked_gliders(config, silent) if silent else {},
+                relays=None if config.relays.broker is None else store.relays(),
             )
     finally:
         store.close()
@@ -399,6 +403,7 @@ def status_as_json(view: Overview) -> dict[str, Any]:
             {"alert": u.alert, "channel": u.channel, "attempts": u.attempts, "error": u.error}
             for u in view.undelivered
         ],
+        "relays": None if view.relays is None else _relays_as_json(view.relays),
         "held": [
             {
                 "alert": u.alert,
@@ -408,6 +413,23 @@ def status_as_json(view: Overview) -> dict[str, Any]:
             }
             for u in view.held
         ],
+    }
+
+
+def _relays_as_json(relays: RelayState) -> dict[str, Any]:
+    """The exchange with other dockservers for machines."""
+    link = relays.link
+    return {
+        "name": None if link is None else link.name,
+        "broker": None if link is None else link.broker,
+        "connected": link is not None and link.is_up,
+        "since": None if link is None else iso_ms(relays.t),
+        "error": None if link is None or not link.error else link.error,
+        "batches_to_send": relays.waiting,
+        "others": {
+            name: {"heard": iso_ms(t), "batches": other.batches, "not_exchanged": list(other.apart)}
+            for name, (t, other) in relays.others.items()
+        },
     }
 
 

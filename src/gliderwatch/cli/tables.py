@@ -18,6 +18,7 @@ from gliderwatch.incidents.open_threads import OpenThread
 from gliderwatch.messages import irregularity_text
 from gliderwatch.messages.formatting import clean, duration, place, utc
 from gliderwatch.model import Alert, Assessment, Flag, Incident, Kind, Severity
+from gliderwatch.store.relays import RelayState
 from gliderwatch.store.state_file import File, Status
 
 # ----------------------------------------
@@ -143,7 +144,29 @@ def status(view: Overview, console: Console) -> None:
         console.print(
             Text(f"gliders not in the configuration: {names} ({len(view.unknown)} files left alone)")
         )
+    if view.relays is not None:
+        _relays(view.relays, console)
     _messages(view, console)
+
+
+def _relays(relays: RelayState, console: Console) -> None:
+    """How the exchange with other dockservers stands."""
+    link = relays.link
+    if link is None:
+        console.print("relays: not connected yet")
+        return
+    state = "connected to" if link.is_up else "NOT CONNECTED to"
+    why = f" ({clean(link.error)})" if link.error else ""
+    text = (
+        f"relays: {clean(link.name)} is {state} {clean(link.broker)} since {utc(relays.t)}{why}; "
+        f"{relays.waiting} batches to send"
+    )
+    console.print(Text(text, style="" if link.is_up and not why else "yellow"), soft_wrap=True)
+    for name, (t, other) in relays.others.items():
+        held = ", ".join(f"{n} batches of {clean(field)}" for field, n in other.batches.items()) or "no batch"
+        apart = f"; not exchanged: {clean(', '.join(other.apart))}" if other.apart else ""
+        text = f"  {clean(name)}, heard of {utc(t)}: {held}{apart}"
+        console.print(Text(text, style="yellow" if apart else ""), soft_wrap=True)
 
 
 def _of_files_and_calls(glider: GliderStatus, console: Console) -> None:

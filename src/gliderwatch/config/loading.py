@@ -29,6 +29,7 @@ from gliderwatch.config.schema import (
     Pages,
     Preset,
     Recipient,
+    Relays,
     Settings,
     State,
     Web,
@@ -55,6 +56,7 @@ class Config(Section):
     fields: dict[Name, FieldSetting] = Field(
         default_factory=dict, description="Fields that the gliders measure together."
     )
+    relays: Relays = Field(default=Relays(), description="Other dockservers, over an MQTT broker.")
     state: State = Field(default=State(), description="What gliderwatch remembers.")
     defaults: Settings = Field(default=Settings(), description="Settings of all gliders.")
     gliders: dict[GliderName, Glider] = Field(
@@ -115,12 +117,17 @@ class Config(Section):
 
         Raises `ConfigError` naming the channel and the reference that cannot be had.
         """
-        key = f"channels.{name}.url"
+        return SecretStr(self.secret(f"channels.{name}.url", self.channels[name].url))
+
+    def secret(self, key: str, template: SecretStr) -> str:
+        """What stands at a key, with its references filled in.
+
+        Raises `ConfigError` naming the key and the reference that cannot be had.
+        """
         try:
-            url = secrets.resolve(self.channels[name].url.get_secret_value(), self.folder)
+            return secrets.resolve(template.get_secret_value(), self.folder)
         except ConfigError as error:
             raise ConfigError(f"{self._document.path}:{self.locate(key)}: {key}: {error}") from None
-        return SecretStr(url)
 
     def channel(self, name: str, illustrator: delivery.Illustrator | None = None) -> delivery.Channel:
         """A channel by which messages can be sent, its mails with pictures where there is who draws them;

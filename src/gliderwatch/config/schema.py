@@ -406,6 +406,27 @@ class FieldSetting(Section):
         return self
 
 
+class Relays(Section):
+    """Other dockservers with which the batches of `fields` are exchanged, over an MQTT broker (version 5).
+
+    Needs the extra `gliderwatch[relays]` ([fleet](fleet.md#relays))."""
+
+    broker: Url | None = Field(
+        default=None,
+        description="`mqtt://USER:PASSWORD@HOST:1883`, or `mqtts://...:8883` with TLS; any part may be a "
+        "reference, as in the URL of a channel. null: nothing is exchanged.",
+    )
+    name: Name | None = Field(
+        default=None, description="Name of this relay, which no other has; null: that of the machine."
+    )
+    topic: Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^+#\x00]+$")] = Field(
+        default="gliderwatch", description="How the topics begin; the same at all relays."
+    )
+    ca: AbsolutePath | None = Field(
+        default=None, description="File of certificates to trust instead of those of the system (PEM)."
+    )
+
+
 class State(Section):
     """What gliderwatch remembers."""
 

@@ -15,7 +15,7 @@ import gsw
 import numpy as np
 
 from gliderwatch.fleet.advice import Box
-from gliderwatch.fleet.constants import LONGEST_STAND, SAMPLE_STEP, SENSORS_OF_FIELDS
+from gliderwatch.fleet.constants import LONGEST_STAND, MOST_SAMPLES, SAMPLE_STEP, SENSORS_OF_FIELDS
 from gliderwatch.fleet.scalar_field import Batch, Estimator, FieldParams
 from gliderwatch.model import Array, Segment, readonly
 
@@ -100,10 +100,10 @@ def packed(batch: Batch) -> bytes:
 def unpacked(data: bytes, identity: str, glider: str) -> Batch:
     """The batch of such bytes. Raises ValueError where they are none."""
     try:
-        raw = zlib.decompress(data)
+        raw = zlib.decompressobj().decompress(data, _HEAD.size + MOST_SAMPLES * _ROW.itemsize)
         start, n = _HEAD.unpack_from(raw)
         found = np.frombuffer(raw, dtype=_ROW, offset=_HEAD.size)
-    except (zlib.error, struct.error) as error:
+    except (zlib.error, struct.error, ValueError) as error:
         raise ValueError(f"no batch of samples: {error}") from None
     if len(found) != n or not n or not np.isfinite(found["value"]).all() or not np.isfinite(start):
         raise ValueError("no batch of samples: cut or damaged")

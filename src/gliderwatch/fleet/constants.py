@@ -52,6 +52,14 @@ SENSORS_OF_FIELDS = {
 """Of each sensor of a field: usual deviation from the mean profile, mean and spread of that before any
 sample, and the unit of all three. Upper ocean of middle latitudes; the spread holds the other seas."""
 
+# Relays
+LARGEST_PARCEL = 64 * 1024
+"""Bytes of samples in one message to other relays: brokers in the cloud take 128 kB."""
+MOST_SAMPLES = 20_000
+"""Samples of a batch at most: two weeks without a surfacing. What is said to be more is no batch."""
+AHEAD = 86400.0
+"""s by which samples from another relay may be ahead of the clock: more is a wrong clock, of one of both."""
+
 # Where to look next
 HEADINGS = 12
 """Headings that the look-ahead compares."""

@@ -197,8 +197,11 @@ def update(known: Information, phi: Array, value: Array, variance: Array) -> Inf
     return Information(known.d + scaled.T @ scaled, known.g + scaled.T @ (value * root))
 
 
-def run(start: Checkpoint | None, batches: Iterable[Batch], params: FieldParams) -> tuple[Checkpoint, ...]:
-    """What is known after each bin that has samples, beginning behind ``start`` (None: with the prior).
+def run(
+    start: Checkpoint | None, batches: Iterable[Batch], params: FieldParams, most: int | None = None
+) -> tuple[Checkpoint, ...]:
+    """What is known after each bin that has samples, beginning behind ``start`` (None: with the prior), of
+    ``most`` bins (None: of all).
 
     ``batches`` are all that have samples in those bins, in any order; samples of earlier bins are passed
     over.
@@ -209,7 +212,7 @@ def run(start: Checkpoint | None, batches: Iterable[Batch], params: FieldParams)
             if start is None or k > start.bin:
                 parts.setdefault(k, []).append(batch)
     last, out = start, list[Checkpoint]()
-    for k in sorted(parts):
+    for k in sorted(parts)[:most]:
         known = prior(params) if last is None else elapse(last.known, (k - last.bin) * BIN, params)
         last = Checkpoint(k, _with_samples(known, parts[k], k, params))
         out.append(last)

@@ -18,10 +18,12 @@ from gliderwatch.config import Config, load
 from gliderwatch.errors import ConfigError, DamagedError, GliderwatchError
 from gliderwatch.model import Alert
 from gliderwatch.service import liveness, preconditions, state_outage, transaction
+from gliderwatch.service.fields import catch_up, take_from_relays
 from gliderwatch.service.heartbeat import Upkeep
 from gliderwatch.service.intake import Intake
 from gliderwatch.service.liveness import BEAT, PidLock
 from gliderwatch.service.page_writer import PagesWritten, PageWriter
+from gliderwatch.service.relays import BatchesCame
 from gliderwatch.service.routing import Routing
 from gliderwatch.service.runtime import Decoded, News, Runtime, build
 from gliderwatch.service.state_outage import StateOutage
@@ -169,6 +171,7 @@ class Daemon:
         self._pages.use(runtime.config)
         self._ais.use(runtime.config)
         self._caught_up = self._retry = False
+        self._behind: dict[str, float] = {}
         self._returned_in: float | None = None
         self._next_scan = self._next_beat = time.monotonic()
         # files that came while nobody watched settle first
@@ -227,6 +230,7 @@ class Daemon:
         if self._caught_up and time.monotonic() >= self._next_tick:
             self._tick()
         if self._is_idle():
+            self._bring_fields_up_to_date()
             self._retention.turn(self._runtime.config.state.keep_days, time.time(), time.monotonic())
         if self._caught_up:
             self._pages.turn(self._store.gliders(), time.monotonic())
@@ -240,7 +244,7 @@ class Daemon:
         settled = self._intake.next_settled()
         due = [self._next_scan - now, self._next_beat - now, BEAT if settled is None else settled]
         due += [self._next_tick - now] if self._caught_up else []
-        due += [self._retention.pause(now)] if self._is_idle() else []
+        due += [0.0 if self._behind else self._retention.pause(now)] if self._is_idle() else []
         due += [self._returned_in] if self._returned_in is not None else []
         return max(0.0, min(due))
 
@@ -266,6 +270,8 @@ class Daemon:
             self._intake.observe(news.path)
         elif isinstance(news, CacheChanged):
             self._retry = True
+        elif isinstance(news, BatchesCame):
+            self._take_from_relays(news)
         elif isinstance(news, PagesWritten):
             return  # the turn that it woke has the next ones written
         elif news == signal.SIGHUP:
@@ -276,6 +282,20 @@ class Daemon:
             self._next_scan = time.monotonic()
         else:  # a folder came: files may have come in it before it was watched
             self._next_scan = time.monotonic()
+
+    def _take_from_relays(self, news: BatchesCame) -> None:
+        """Put the batches of another relay into their field."""
+        field = next((each for each in self._runtime.fields if each.name == news.field), None)
+        if field is not None and take_from_relays(self._store, field, news.batches):
+            self._behind[field.name] = float("-inf")
+
+    def _bring_fields_up_to_date(self) -> None:
+        """Go on with a field into which batches of other relays came, by some hours of samples."""
+        for name, before in list(self._behind.items())[:1]:
+            field = next(each for each in self._runtime.fields if each.name == name)
+            self._behind[name] = catch_up(self._store, field)
+            if self._behind[name] == before:
+                del self._behind[name]
 
     def _scan(self) -> None:
         """Look at everything: what the observer missed, what waits, folders that are new."""

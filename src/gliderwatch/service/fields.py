@@ -28,10 +28,14 @@ from gliderwatch.store.state_file import Store
 if TYPE_CHECKING:
     from netCDF4 import Dataset
 
+CATCH_UP = 6
+"""Hours of samples by which a field is brought up to date at a time: files that come do not wait for more."""
+
 
 @dataclass(frozen=True, slots=True)
 class FleetField:
-    """A field of the configuration; ``outputs`` is the folder for advice, None where none is wanted."""
+    """A field of the configuration; ``outputs`` is the folder for advice, None where none is wanted.
+    ``is_shared``: its batches go to other relays."""
 
     name: str
     box: Box
@@ -40,6 +44,7 @@ class FleetField:
     bounds: Bounds = Bounds()
     way: Way = "look_ahead"
     outputs: Path | None = None
+    is_shared: bool = False
 
     @property
     def key(self) -> str:
@@ -68,12 +73,29 @@ def _field(config: Config, name: str) -> FleetField:
     setting = config.fields[name]
     area, (top, bottom) = setting.box, setting.depth
     box = Box(area.south, area.west, area.north, area.east, top, bottom)
-    params = params_of(setting.sensor, setting.estimator)
+    params, is_shared = params_of(setting.sensor, setting.estimator), config.relays.broker is not None
     if setting.advice is None:
-        return FleetField(name, box, setting.sensor, params)
+        return FleetField(name, box, setting.sensor, params, is_shared=is_shared)
     wanted = setting.advice
     bounds = Bounds(wanted.polygon, wanted.shallowest, apart=wanted.apart_km * 1e3)
-    return FleetField(name, box, setting.sensor, params, bounds, wanted.way, Path(wanted.outputs))
+    outputs = Path(wanted.outputs)
+    return FleetField(name, box, setting.sensor, params, bounds, wanted.way, outputs, is_shared)
+
+
+def take_from_relays(store: Store, field: FleetField, batches: Sequence[Batch]) -> bool:
+    """Put batches of other relays into a field, in a transaction of its own; whether there was news."""
+    with store.transaction():
+        if store.fields.begin(field.name, field.key):
+            store.fields.put(field.name, _all_batches(store, field), is_shared=field.is_shared)
+        return store.fields.put(field.name, batches)
+
+
+def catch_up(store: Store, field: FleetField) -> float:
+    """Bring a field up to date by `CATCH_UP` hours of samples, in a transaction of its own; the time (s) that
+    it is of then: the same as before where there was nothing to do."""
+    with store.transaction():
+        newest = store.fields.advance(field.name, field.params, CATCH_UP)
+    return -inf if newest is None else newest.t
 
 
 def add(store: Store, fields: Sequence[FleetField], segment: Segment) -> None:
@@ -83,10 +105,10 @@ def add(store: Store, fields: Sequence[FleetField], segment: Segment) -> None:
     """
     for field in fields:
         if store.fields.begin(field.name, field.key):
-            store.fields.put(field.name, _all_batches(store, field))
+            store.fields.put(field.name, _all_batches(store, field), is_shared=field.is_shared)
         batch = batch_of(segment, field.sensor, field.box)
         if batch is not None:
-            store.fields.put(field.name, [batch])
+            store.fields.put(field.name, [batch], is_shared=field.is_shared)
         if field.bounds.shallowest is not None:
             store.fields.sound(field.name, _soundings(segment))
 

@@ -8,10 +8,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 from gliderwatch import config as settings
 from gliderwatch.config import Config, Problem, expand, secrets
+from gliderwatch.delivery.mqtt import broker_of
 from gliderwatch.errors import ConfigError, DamagedError, StateError
 from gliderwatch.service import heartbeat
 from gliderwatch.service.liveness import alive_path
@@ -134,6 +136,23 @@ def _secrets(config: Config) -> Iterator[Refusal]:
             yield Refusal(f"channels.{name}.url", str(error), cure, _lacks_credentials(template))
 
 
+def _relays(config: Config) -> Iterator[Refusal]:
+    """The broker of the relays can be named, and what speaks with it is installed."""
+    if config.relays.broker is None:
+        return
+    key, template = "relays.broker", config.relays.broker.get_secret_value()
+    try:
+        broker_of(secrets.resolve(template, config.folder), config.relays.ca)
+    except (ConfigError, ValueError) as error:
+        cure = "correct it: the service does not start with it"
+        yield Refusal(key, str(error), cure, _lacks_credentials(template))
+    if find_spec("paho") is None:
+        yield Refusal(key, "paho-mqtt is not installed", "docs/install.md says how")
+    if config.relays.ca is not None and not os.access(config.relays.ca, os.R_OK):
+        cure = "name a file of certificates that this user may read"
+        yield Refusal("relays.ca", f"{config.relays.ca} cannot be read", cure)
+
+
 def _lacks_credentials(template: str) -> bool:
     return secrets.needs_credentials(template) and secrets.CREDENTIALS not in os.environ
 
@@ -144,4 +163,5 @@ PRECONDITIONS: tuple[Callable[[Config], Iterator[Refusal]], ...] = (
     _content,
     _heartbeat,
     _secrets,
+    _relays,
 )

@@ -25,6 +25,7 @@ from gliderwatch.service.fields import FleetField, fields_of
 from gliderwatch.service.layers import wants_science
 from gliderwatch.service.mail_pictures import MailPictures
 from gliderwatch.service.page_writer import PagesWritten
+from gliderwatch.service.relays import BatchesCame, RelayExchange, relay_settings
 from gliderwatch.service.routing import Routing, routing_of
 from gliderwatch.slocum.caches import SensorLists, lists_folder
 from gliderwatch.slocum.decode import Decoder
@@ -98,7 +99,7 @@ class Decoded:
         return error if isinstance(error, Exception) else self.future.result()
 
 
-News = Change | Decoded | PagesWritten | signal.Signals
+News = Change | Decoded | PagesWritten | BatchesCame | signal.Signals
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,11 +120,14 @@ class Runtime:
     fields: tuple[FleetField, ...]
     channels: dict[str, Channel]
     pictures: MailPictures
+    relays: RelayExchange | None = None
 
     def start(self, before: Runtime | None = None) -> None:
         """Begin to work, in place of the parts before."""
         if before is None or before.dispatcher is not self.dispatcher:
             self.dispatcher.start()
+        if self.relays is not None and (before is None or before.relays is not self.relays):
+            self.relays.start()
         self.watcher.start()
 
     def stop(self, after: Runtime | None = None) -> None:
@@ -134,6 +138,8 @@ class Runtime:
         if after is None or after.dispatcher is not self.dispatcher:
             self.dispatcher.stop()
             self.pictures.stop()
+        if self.relays is not None and (after is None or after.relays is not self.relays):
+            self.relays.stop()
 
     def cache_folders(self) -> tuple[Path, ...]:
         """Where sensor lists are now: the cache folders, then the lists that came inside of files."""
@@ -201,7 +207,7 @@ def build(
         config.dockserver.observer,
         logs=config.dockserver.logs,
     )
-    ocean, routing = OceanCache(config), routing_of(config)
+    ocean, routing, relays = OceanCache(config), routing_of(config), _relays(config, news, before)
     lists = SensorLists(lists_folder(Path(config.state.path)))
     # shared: what follows can no longer refuse the configuration
     decoder = Decoder((), max_workers=workers) if before is None else before.decoder
@@ -220,7 +226,18 @@ def build(
         fields_of(config),
         channels,
         pictures,
+        relays,
     )
     decoder.science = wants_science(config)
     decoder.cache_folders = parts.cache_folders()
     return parts
+
+
+def _relays(config: Config, news: SimpleQueue[News], before: Runtime | None) -> RelayExchange | None:
+    """The exchange with other relays; the one before, where its settings are the same."""
+    settings = relay_settings(config)
+    if settings is None:
+        return None
+    if before is not None and before.relays is not None and before.relays.settings == settings:
+        return before.relays
+    return RelayExchange(settings, Path(config.state.path), news.put)

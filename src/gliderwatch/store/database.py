@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sqlite3
 import stat
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from functools import cache
@@ -125,7 +126,7 @@ __all__ = [
     "schema",
 ]
 
-SCHEMA = 11
+SCHEMA = 12
 DELIVERY_BY_WORDS = """CASE
     WHEN delivered_at IS NULL THEN 'pending' WHEN error = '' THEN 'delivered'
     WHEN error LIKE 'withdrawn: %' THEN 'withdrawn' WHEN error LIKE 'given up: %' THEN 'unreadable'
@@ -307,6 +308,18 @@ CREATE INDEX health_to_judge ON health (glider, t) WHERE judged IS NULL;
     11: """
 UPDATE said SET data = said_of_schema_10(data);
 """,
+    12: """
+ALTER TABLE field_batches ADD COLUMN crc INTEGER NOT NULL DEFAULT 0;      -- of id and data
+ALTER TABLE field_batches ADD COLUMN to_send INTEGER NOT NULL DEFAULT 0;  -- 1: no broker has it yet
+UPDATE field_batches SET crc = crc_of_batch(id, data);
+CREATE INDEX field_batches_by_crc ON field_batches (field, first_t, crc);
+CREATE INDEX field_batches_to_send ON field_batches (field, id) WHERE to_send = 1;
+CREATE TABLE relays (             -- how it stands with the exchange of batches: `fleet.exchange`
+    name  TEXT PRIMARY KEY,       -- of another relay; empty: this one's connection to the broker
+    t     REAL NOT NULL,          -- since when, or when it was last heard of
+    data  TEXT NOT NULL           -- `store.relays.Link` or `store.relays.Neighbour`
+) STRICT;
+""",
 }
 """SQL that leads from the schema before to the one of the key. It may call the functions of
 `conversion.ROW_CONVERTERS`. Only the 2nd sets checkpoints to NULL: nothing before it had `state.keep_days`,
@@ -469,12 +482,18 @@ def _migrate(connection: sqlite3.Connection, path: Path | str) -> None:
     steps += [MIGRATIONS[v] for v in range(max(version, 1) + 1, SCHEMA + 1)]
     for name, convert in conversion.ROW_CONVERTERS.items():
         connection.create_function(name, 1, _on_text(convert), deterministic=True)
+    connection.create_function("crc_of_batch", 2, crc_of_batch, deterministic=True)
     with closing(connection.cursor()) as cursor:
         cursor.executescript(
             "BEGIN IMMEDIATE;\n"
             + "\n".join(steps)
             + f"\nPRAGMA application_id = {APPLICATION_ID};\nPRAGMA user_version = {SCHEMA};\nCOMMIT;"
         )
+
+
+def crc_of_batch(identity: str, data: bytes) -> int:
+    """The checksum by which relays see whether they have the same batch."""
+    return zlib.crc32(data, zlib.crc32(identity.encode()))
 
 
 def _on_text(convert: conversion.Converter) -> Callable[[str], str]:

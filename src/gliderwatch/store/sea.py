@@ -18,6 +18,7 @@ from gliderwatch.layers.advice import Layered
 from gliderwatch.model import Array, SegmentId, readonly
 from gliderwatch.store import codec
 from gliderwatch.store.codec import values
+from gliderwatch.store.database import crc_of_batch
 
 BLOCK = 6
 """Bins of which one checkpoint is written: half a megabyte each. Those between are made again when needed."""
@@ -55,10 +56,10 @@ class Fields:
         self._newest.pop(field, None)
         return True
 
-    def put(self, field: str, batches: Iterable[Batch]) -> bool:
-        """Take batches in and drop the checkpoints after them; False where all is known already.
+    def put(self, field: str, batches: Iterable[Batch], *, is_shared: bool = False) -> bool:
+        """Take batches in and drop the checkpoints after them; False where all is there already.
 
-        Of two batches of one id the one with more samples stays.
+        Of two batches of one id the one with more samples stays. ``is_shared``: other relays are to get them.
         """
         first = inf
         for batch in batches:
@@ -66,8 +67,9 @@ class Fields:
             if kept is not None and (len(kept.t), packed(kept)) >= (len(batch.t), data):
                 continue
             first = min(first, *(float(each.t[0]) for each in (batch, kept) if each is not None))
-            row = (field, batch.id, batch.glider, float(batch.t[0]), float(batch.t[-1]), data)
-            self._db.execute("INSERT OR REPLACE INTO field_batches VALUES (?, ?, ?, ?, ?, ?)", row)
+            crc, times = crc_of_batch(batch.id, data), (float(batch.t[0]), float(batch.t[-1]))
+            row = (field, batch.id, batch.glider, *times, data, crc, is_shared)
+            self._db.execute("INSERT OR REPLACE INTO field_batches VALUES (?, ?, ?, ?, ?, ?, ?, ?)", row)
         if first == inf:
             return False
         self._db.execute("DELETE FROM field_checkpoints WHERE field = ? AND bin >= ?", (field, first // BIN))
@@ -75,11 +77,12 @@ class Fields:
         self._newest[field] = tuple(each for each in held if each.bin < first // BIN)
         return True
 
-    def advance(self, field: str, params: FieldParams) -> Checkpoint | None:
-        """Go on to the last samples, and write checkpoints on the way: what is known then."""
+    def advance(self, field: str, params: FieldParams, most: int | None = None) -> Checkpoint | None:
+        """Go on to the last samples, or by ``most`` bins, and write checkpoints on the way: what is known
+        then."""
         held = self._newest.get(field, ())
         start = held[-1] if held else self._start(field, inf)
-        after = run(start, self._batches(field, start), params)
+        after = run(start, self._batches(field, start), params, most)
         whole = after if start is None else (start, *after)
         self._newest[field] = (*held[:-1], *whole)[-2 * BLOCK :]
         written = [a for a, b in itertools.pairwise(whole) if a.bin // BLOCK < b.bin // BLOCK]

@@ -23,6 +23,7 @@ from gliderwatch.store import codec, outbox, retention, segments
 from gliderwatch.store.codec import File, Status, Undelivered, file_of, values
 from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, has_table, read_only
 from gliderwatch.store.health import HealthRows
+from gliderwatch.store.relays import RelayState, relay_state
 from gliderwatch.store.results import Annotations, Calls, GliderFacts
 from gliderwatch.store.sea import Fields, LayerRows
 from gliderwatch.store.segments import RECENT, Segments
@@ -282,6 +283,10 @@ class Store:
     def undelivered(self) -> list[Undelivered]:
         """What waits in the outbox, oldest first."""
         return outbox.undelivered(self._db)
+
+    def relays(self) -> RelayState:
+        """How the exchange with other relays stands."""
+        return relay_state(self._db)
 
     def refused(self, since: float) -> list[Undelivered]:
         """What a channel refused for good, or could not be read, since a time (s); oldest first."""
