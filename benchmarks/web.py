@@ -101,6 +101,7 @@ def main() -> None:
         config.write_text(
             f"dockserver: {{roots: [{sea}/gliders], cache: [{sea}/cache], settle_seconds: 1}}\n"
             f"state: {{path: {state}}}\nweb: {{port: {PORT}}}\npages: {{folder: {folder}/pages}}\n"
+            f"gliders: {{{', '.join(f'sim-{k:02d}: ' for k in range(1, 11))}}}\n"
         )
         begin(stack, "run", "-c", config)
         begin(stack, "web", "-c", config)

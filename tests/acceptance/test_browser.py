@@ -9,6 +9,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 from html import unescape
@@ -71,6 +72,18 @@ class Served:
         found: dict[str, Any] = json.loads(unescape(told[1]))
         return found
 
+    def shoot(self, page: str, name: str, size: tuple[int, int]) -> Path:
+        """A picture of the first screen of a page, in the output of the tests."""
+        SHOTS.mkdir(parents=True, exist_ok=True)
+        shot = SHOTS / f"{name}-{size[0]}.png"
+        size_of = f'width="{size[0]}" height="{size[1]}" style="border:0"'
+        frame = f'<iframe src="{page}" {size_of} sandbox="allow-same-origin"></iframe>'  # without scripts
+        text = f'<!DOCTYPE html><body style="margin:0">{frame}'
+        (self.folder / "shot.html").write_text(text)  # no window of the browser is as narrow as a phone
+        url = f"http://127.0.0.1:{self.port}/shot.html"
+        browse(f"--screenshot={shot}", f"--window-size={max(size[0], 500)},{size[1]}", url)
+        return shot
+
 
 def browse(*arguments: str) -> str:
     """Run the browser, which finds no other host."""
@@ -111,21 +124,30 @@ def fleet() -> tuple[GliderView, ...]:
     )
 
 
-@pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    served = Served(tmp_path_factory.mktemp("pages"))
-    frame = Frame(NOW, NOW + 900.0)
-    (served.folder / "index.html").write_text(fleet_page(fleet(), frame, world()))
-    (served.folder / "electa.html").write_text(glider_page(fleet()[0], frame, world()))
-    (served.folder / "electa-sheet.html").write_text(sheet_page(fleet()[0], frame, world()))
-    fresh = Frame(NOW, time.time() + 3600.0)
-    (served.folder / "fresh.html").write_text(fleet_page(fleet(), fresh, world()))
+@contextmanager
+def serving(folder: Path) -> Iterator[Served]:
+    """A folder of pages on a port of this machine."""
+    served = Served(folder)
     server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, served=served))
     served.port = server.server_address[1]
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
-    thread.start()
-    yield served
-    server.shutdown()
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        yield served
+    finally:
+        server.shutdown()
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    folder = tmp_path_factory.mktemp("pages")
+    frame = Frame(NOW, NOW + 900.0)
+    (folder / "index.html").write_text(fleet_page(fleet(), frame, world()))
+    (folder / "electa.html").write_text(glider_page(fleet()[0], frame, world()))
+    (folder / "electa-sheet.html").write_text(sheet_page(fleet()[0], frame, world()))
+    fresh = Frame(NOW, time.time() + 3600.0)
+    (folder / "fresh.html").write_text(fleet_page(fleet(), fresh, world()))
+    with serving(folder) as served:
+        yield served
 
 
 @pytest.mark.parametrize("size", [PHONE, DESK])
@@ -139,14 +161,7 @@ def test_a_page_fits_its_window_without_scripts_and_asks_nothing_else(
     assert found["small"] >= 12.0
     assert found["word"] not in {"rgba(0, 0, 0, 0)", ""}  # the style is taken by the page's policy
     assert set(served.asked) <= {"/look.html", f"/{page}", "/favicon.ico"}
-    SHOTS.mkdir(parents=True, exist_ok=True)
-    shot = SHOTS / f"{page.removesuffix('.html')}-{size[0]}.png"
-    text = (
-        f'<!DOCTYPE html><iframe src="{page}" width="{size[0]}" height="{size[1]}" style="border:0"></iframe>'
-    )
-    (served.folder / "shot.html").write_text(text)  # no window of the browser is as narrow as a phone
-    url = f"http://127.0.0.1:{served.port}/shot.html"
-    browse(f"--screenshot={shot}", f"--window-size={max(size[0] + 16, 500)},{size[1] + 16}", url)
+    shot = served.shoot(page, page.removesuffix(".html"), size)
     assert shot.read_bytes().startswith(b"\x89PNG")
 
 

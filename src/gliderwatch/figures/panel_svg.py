@@ -151,16 +151,17 @@ def _legend(panel: Panel) -> Iterator[str]:
         )
     entries += [
         (words, f'<path class="m{k % 2}" transform="translate(7 0)" d="{_SHAPES[k % 2]}"/>')
-        for k, (words, _, _) in enumerate(panel.marked)
+        for k, (words, t, _) in enumerate(panel.marked)
+        if len(t)
     ]
     if panel.band is not None:
         entries.append(("normal", '<path class="band" d="M0-5h14v10H0z"/>'))
     if len(entries) < 2:
         return
-    x = LEFT
+    x = 2.0
     for label, mark in entries:
         yield f'<g transform="translate({x:.0f} 22)">{mark}{_text(18, 4, label, "start")}</g>'
-        x += 28 + CHAR * len(label)
+        x += 24 + CHAR * len(label)
 
 
 def _text(x: float, y: float, label: str, anchor: str, kind: str = "") -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from types import MappingProxyType
 
@@ -28,6 +29,8 @@ CALLS = 30 * 86400.0
 """Seconds back for which its calls are read."""
 ALERTS = 40
 """Newest messages that are looked through for those of what goes on."""
+PROFILES = 40
+"""Segments of which a section shows the profile at the most: some 5 ms of processor each."""
 LOG = 6000
 """Bytes of the end of the log of its last call that a page shows."""
 
@@ -58,6 +61,7 @@ def read_glider(
     awaited = None if expected is None else expected_call(expected, signs, now, attention.overdue_hours)
     calls = known.calls(now - CALLS) if known.last_log() is not None else ()
     calls = tuple(call for call in calls if call.began <= now)
+    profiles = read_section(store, name, PROFILES, now) if whole else None
     readings = store.health.readings(name, now - (REMEMBERED if whole else FIT), now)
     return GliderView(
         name=name,
@@ -74,6 +78,8 @@ def read_glider(
         notified=store.notified(name),
         waypoint=calls[-1].waypoint if calls else None,
         readings=readings if whole else {},
+        section=profiles[0] if profiles is not None and profiles[1] else None,
+        layers=profiles[1] if profiles is not None else (),
         battery=_battery_end(readings, battery),
     )
 
@@ -103,14 +109,17 @@ def read_fleet(
     )
 
 
-def read_section(store: Store, name: str, segments: int) -> tuple[Section, tuple[LayerAdvice, ...]]:
-    """The section of the last `segments` of a glider, and what was found and advised after each profile.
+def read_section(
+    store: Store, name: str, segments: int, until: float = inf
+) -> tuple[Section, tuple[LayerAdvice, ...]]:
+    """The section of the last `segments` of a glider, and what was found and advised after each profile; not
+    later than `until` (s).
 
     It is of the sensor whose layers were found last; both are empty where layers are off.
 
     Raises StateError where the state file cannot be read.
     """
-    rows = store.layers.segments(name, segments)
+    rows = [row for row in store.layers.segments(name, segments) if row[1].advice.t <= until]
     sensor = rows[-1][1].advice.sensor if rows else ""
     held = [(casts_of(store.segments.get(identity), sensor), one.advice) for identity, one in rows]
     held = [(casts, advice) for casts, advice in held if casts and advice.sensor == sensor]

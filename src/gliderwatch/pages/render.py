@@ -18,7 +18,7 @@ from jinja2.runtime import Context
 from markupsafe import Markup
 
 from gliderwatch import __version__
-from gliderwatch.figures import chart, dives, health, panel_svg, timeline
+from gliderwatch.figures import chart, dives, health, panel_svg, section_svg, timeline
 from gliderwatch.figures.coast import Land
 from gliderwatch.figures.plots import Panel
 from gliderwatch.figures.timeline import Bar
@@ -28,7 +28,7 @@ from gliderwatch.pages import facts, maps
 from gliderwatch.pages.call_log import call_log, transferred
 from gliderwatch.pages.view import GliderView, Verdict, verdict, worst_first
 
-DAY = 86400.0
+HOUR, DAY = 3600.0, 86400.0
 NOTHING: Mapping[str, str] = MappingProxyType({})
 ROWS = 15
 """Dives in the table of a page."""
@@ -124,6 +124,8 @@ def glider_page(view: GliderView, frame: Frame, land: Land, take_on: Mapping[str
         mute=take_on.get(view.name, ""),
         map=Markup(chart.svg(maps.of_glider(view), land)),
         plots=_plots(view, span),
+        section=_section(view, span),
+        layers=tuple(reversed(view.layers))[:ROWS],
         calls=tuple(reversed(view.calls[-5:])),
         log=call_log(view.log, view.calls[-1] if view.calls else None),
         timeline=Markup(past),
@@ -197,6 +199,14 @@ def _plot(panel: Panel, span: tuple[float, float]) -> Plot:
     return Plot(panel.name, panel.shows, Markup(panel_svg.svg(panel, span)))
 
 
+def _section(view: GliderView, span: tuple[float, float]) -> Markup:
+    """The section along its way, where layers are looked for; over the time of its profiles alone."""
+    if view.section is None:
+        return Markup("")
+    start = max(span[0], float(view.section.t[0]) - 6 * HOUR)
+    return Markup(section_svg.svg(view.section, view.layers, start, max(span[1], start + HOUR)))
+
+
 def _bars(view: GliderView, *, by_glider: bool = False) -> Iterator[Bar]:
     """What needed somebody, as bars of a timeline: a row a glider, or one a kind."""
     for m in view.matters:
@@ -244,7 +254,7 @@ def policy(texts: Iterable[str], scripts: Iterable[str]) -> str:
 
 @cache
 def _style() -> str:
-    return part("style.css") + chart.STYLE + panel_svg.STYLE + timeline.STYLE
+    return part("style.css") + chart.STYLE + panel_svg.STYLE + timeline.STYLE + section_svg.STYLE
 
 
 def page_policy() -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from gliderwatch.forecast.constants import GPS_ERROR
 from gliderwatch.health.battery import End
@@ -14,6 +14,8 @@ from gliderwatch.incidents.notices import DriftEllipse
 from gliderwatch.incidents.notifications import NotificationState
 from gliderwatch.incidents.overdue import ExpectedCall, current
 from gliderwatch.incidents.whereabouts import whereabouts
+from gliderwatch.layers.advice import LayerAdvice
+from gliderwatch.layers.section import Section
 from gliderwatch.messages.formatting import INCIDENTS, clean, duration, speed, utc
 from gliderwatch.model import Alert, Assessment, Call, Fix, Incident, Kind, NextSurfacing, Severity
 from gliderwatch.pages.matters import Matter, matters
@@ -25,7 +27,8 @@ class GliderView:
     """One glider as known at ``now`` (s): its last ``dives`` that ended and ``incidents``, in order of time,
     who took them on (``acks``), the next surfacing ``expected``, the call ``awaited``, its ``calls`` and the
     text of the ``log`` of the last one, the newest ``alerts`` first, and what people were ``notified`` of;
-    ``waypoint`` (degrees) where it is bound; ``readings`` of its health, and when its ``battery`` ends."""
+    ``waypoint`` (degrees) where it is bound; ``readings`` of its health, when its ``battery`` ends, and the
+    ``section`` of a property along its way with the ``layers`` found and advised after each profile."""
 
     name: str
     now: float
@@ -41,6 +44,8 @@ class GliderView:
     notified: NotificationState = NotificationState()
     waypoint: tuple[float, float] | None = None
     readings: Readings = field(default_factory=dict)
+    section: Section | None = None
+    layers: tuple[LayerAdvice, ...] = ()
     battery: End | None = None
 
     @property
@@ -56,8 +61,9 @@ class GliderView:
 
     @property
     def matters(self) -> tuple[Matter, ...]:
-        """What needs, or needed, somebody, in order of time."""
-        return matters(self.incidents, self.notified, self.acks)
+        """What needs, or needed, somebody by now, in order of time."""
+        found = (m for m in matters(self.incidents, self.notified, self.acks) if m.since <= self.now)
+        return tuple(replace(m, over=None) if m.over is not None and m.over > self.now else m for m in found)
 
     @property
     def open_matters(self) -> tuple[Matter, ...]:
