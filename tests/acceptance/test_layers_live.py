@@ -29,6 +29,7 @@ def test_a_science_file_that_comes_late_makes_the_mission_arguments(site: Site, 
         site.put("usf-sam", f"{NAME}.tbd", (mission / "from-glider" / f"{NAME}.tbd").read_bytes())
         until((out / "usf-sam-yo-band.ma").exists, "the mission arguments are written")
         assert "d_target_depth(m)" in (out / "usf-sam-yo-band.ma").read_text()
+        until(lambda: daemon.log("advice written"), "it is in the log")  # after the files
         (written,) = daemon.log("advice written")
         assert written["glider"] == "usf-sam"
     kept = {path.name for path in site.root.rglob("*") if path.is_file()}
