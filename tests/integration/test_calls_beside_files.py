@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import pytest
 
-from gliderwatch.model import Call, Fix, Segment
+from gliderwatch.model import Call, Fix, Happened, Happening, Segment
 from gliderwatch.navigation.call_fixes import FromCall, missing_in_file, with_call
 from gliderwatch.params import GliderParams
 from gliderwatch.service import transaction
@@ -38,7 +38,9 @@ def calls(segments: Sequence[Segment]) -> list[Call]:
         lat, lon = (s.get(name).between(s.last_t - SURFACE, INF) for name in ("fix_lat", "fix_lon"))
         fix = Fix(float(lat.t[0]), float(lat.v[0]), float(lon.v[0]))
         began = s.last_t + 60.0
-        found.append(Call("unit", f"{k}.log", began, began + 200.0, True, fix=fix, surfaced=fix))
+        found.append(
+            Call("unit", f"{k}.log", began, began + 200.0, True, mission="a.mi", fix=fix, surfaced=fix)
+        )
     return found
 
 
@@ -133,6 +135,15 @@ def test_next_surfacing_rests_on_a_call_until_its_file_comes(whole: list[Segment
         pytest.approx(by_call.lon, abs=0.005),
     )
     assert dock.store._db.execute("SELECT count(*) FROM expected WHERE segment = ''").fetchone()[0] == 0
+
+
+def test_glider_at_its_prompt_is_expected_nowhere_else(whole: list[Segment]) -> None:
+    dock, (*_, last) = Dock(), calls(whole)
+    for segment in whole[:-1]:
+        dock.file(segment)
+    before = dock.store.facts("unit").expected(INF)
+    dock.log(replace(last, happened=(Happened(Happening.GLIDER_DOS, last.last_t, "A 8"),)))
+    assert dock.store.facts("unit").expected(INF) == before
 
 
 def test_reason_of_the_surfacing_is_evidence_of_its_dive(whole: list[Segment]) -> None:

@@ -102,7 +102,7 @@ def announce(
     over = [g for k, g in enumerate(groups) if k + 1 < len(groups) or _is_over(g, now)]
     run: list[Surfacing] = []
     for group in over:
-        if _is_in_mission(group):  # what is at its prompt or on deck sends nothing
+        if is_in_mission(group):  # what is at its prompt or on deck sends nothing
             run = [] if _has_file(group, signs) else [*run, group]
     if not run:
         return _over(glider, before, over)
@@ -145,7 +145,7 @@ def _is_over(surfacing: Surfacing, now: float) -> bool:
     return now - last.last_t > LONGEST_CALL or (last.over and not last.calls_back)
 
 
-def _is_in_mission(surfacing: Surfacing) -> bool:
+def is_in_mission(surfacing: Surfacing) -> bool:
     """Whether a mission runs, and nothing that is reported as an abort (`incidents.aborts`) has happened."""
     return any(call.mission for call in surfacing) and not any(call.happened for call in surfacing)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import inf
 
 from gliderwatch.forecast.outlook import after_call
-from gliderwatch.incidents.calls import surfacings
+from gliderwatch.incidents.calls import is_in_mission, surfacings
 from gliderwatch.incidents.constants import GONE
 from gliderwatch.model import NextSurfacing, Segment, SegmentId
 from gliderwatch.navigation.call_fixes import FromCall, missing_in_file, with_call
@@ -71,7 +71,10 @@ def expect_by_calls(store: Store, glider: str, params: GliderParams, now: float)
 
 
 def _next_surfacing(store: Store, glider: str, params: GliderParams, now: float) -> NextSurfacing | None:
-    """The next surfacing by the last call, where no file has come of that surfacing by `now` (s)."""
+    """The next surfacing by the last call, where no file has come of that surfacing by `now` (s).
+
+    None as well of a glider that has fallen out of its mission: it stays at the surface.
+    """
     calls = store.calls.during(glider, max(store.segments.last_surfacing(glider), now - GONE), inf)
     found = [call for call in calls if call.surfaced is not None]
     state = store.segments.newest(glider) if found else None
@@ -79,6 +82,6 @@ def _next_surfacing(store: Store, glider: str, params: GliderParams, now: float)
         return None
     *_, last = surfacings(found)
     fix, memory = last[0].surfaced, state.memory
-    if fix is None:
+    if fix is None or not is_in_mission(last):
         return None
     return after_call(memory.surfacings, fix, last[-1].waypoint, memory.estimate, params.surfacing_hours)
