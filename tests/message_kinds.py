@@ -7,7 +7,7 @@ from dataclasses import replace
 from alert_support import DISAGREE, DIVE, HEALTHY, SLOW, SURFACE, incident
 from gliderwatch.estimation.modes import MODES
 from gliderwatch.estimation.verdict import FASTER, Blame
-from gliderwatch.fleet.cross_check import Fault, Hypothesis
+from gliderwatch.fleet.cross_check import Fault, Hypothesis, Reference
 from gliderwatch.health.rule import Finding
 from gliderwatch.incidents.notices import (
     Aborted,
@@ -235,6 +235,7 @@ def kinds() -> dict[str, Alert]:
                 ("angus", "bruce"),
                 8e3,
                 situation(HEALTHY),
+                Reference((0.02, -0.21), (0.01, -0.09), 0.03),
             ),
         ),
         "neighbours-all": message(

@@ -113,3 +113,25 @@ def a_dive():
     assert SAMPLES
     numbers = {"heading_mean": 90.0, "heading_steadiness": 0.9, "own_speed": 0.31}
     return replace(_at(_HEALTHY, T0), lat=50.0, lon=1.0, reference_u=0.1, reference_v=0.2, evidence=numbers)
+
+
+def test_a_sure_fault_comes_with_what_the_others_measured() -> None:
+    currents = wrong(healthy := fleet(6, 4), Fault.LOSS, 0.4, "g2")
+    check = cross_check(currents, "g2")
+    last = [k for k, each in enumerate(currents) if each.glider == "g2"][-1]
+    assert check.reference is not None
+    assert check.reference.own == (currents[last].u, currents[last].v)
+    off = np.subtract(check.reference.flow, (healthy[last].u, healthy[last].v))
+    assert np.hypot(*off) < 3 * check.reference.sigma < 0.2
+    assert cross_check(healthy, "g2").reference is None
+
+
+def test_a_front_is_no_fault() -> None:
+    """A jet of 0.8 m/s and 25 km that one of six meets: with eddies of 9 km alone it is taken for a fault."""
+
+    def in_front(each: DiveCurrent) -> DiveCurrent:
+        lat = (each.start.lat + each.end.lat) / 2
+        return replace(each, u=each.u + 0.8 / np.cosh((lat - 50.25) / 0.15) ** 2)
+
+    currents = [in_front(each) for each in fleet(6, 7)]
+    assert [cross_check(currents, f"g{k}").sure for k in range(6)] == [None] * 6

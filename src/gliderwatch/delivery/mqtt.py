@@ -27,6 +27,11 @@ LONGEST_RETRY = 60
 ANSWER = 10.0
 """s within which a broker has to answer the doctor."""
 _ONCE_AT_LEAST = 1
+_LOST = {
+    "Session taken over": "another relay has the same name: give each its own (relays.name)",
+    "Unspecified error": "the connection was lost",
+}
+"""Plainer words for some reasons of a disconnection (MQTT 5)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,8 +122,7 @@ class Connection:
         self._ears.up(False, _words(sys.exc_info()[1]))
 
     def _on_disconnect(self, _client: Any, _data: Any, _flags: Any, code: Any, _properties: Any) -> None:
-        taken = " (another relay has the same name)" if str(code) == "Session taken over" else ""
-        self._ears.up(False, f"{code}{taken}" if code.is_failure else "")
+        self._ears.up(False, _LOST.get(str(code), str(code)) if code.is_failure else "")
 
 
 def reach(broker: Broker) -> str | None:

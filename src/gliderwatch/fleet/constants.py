@@ -95,19 +95,23 @@ TIDE_GRADIENT = 0.02
 """m/s over `FLOW_SCALE`: by how much that differs in space."""
 DAC_NOISE = 0.02
 """m/s, a component: error of a depth-averaged current of a healthy glider."""
-SEA_EDDIES = (0.02, 0.04, 0.08, 0.16)
-"""m/s: sizes of eddies that are tried; each explanation of the currents takes the one that suits it best."""
-SEA_MEAN, SEA_TIDE, SEA_TIDE_GRADIENT = 0.2, 0.25, 0.08
+SEA_EDDIES = (0.02, 0.06, 0.18, 0.5)
+"""m/s: sizes of eddies that are tried, from a slack sea to a jet of 1 m/s; each explanation of the currents
+takes the sea that suits it best."""
+SEA_SCALES = (60e3, 150e3, 300e3)
+"""m: scales that are tried: spreads of 9, 24 and 47 km, from submesoscale to boundary currents. With the
+first alone a front is taken for a fault, and a glider's neighbours, 20 km away, say little of it."""
+SEA_MEAN, SEA_TIDE, SEA_TIDE_GRADIENT = 0.3, 0.3, 0.2
 """m/s: mean flow, a part of a tide, and by how much that differs over `FLOW_SCALE`, where the sea is not
-known: wide, not wrong (shelf seas have M2 of 0.7 m/s)."""
+known: wide, not wrong (shelf seas have M2 of 0.7 m/s, which goes 20 degrees on in 60 km of 50 m of water)."""
 CHECK_WINDOW = 4 * 86400.0
 """s: dives of this long are compared with those of the neighbours."""
 LEAST_DIVES, MOST_DIVES = 4, 16
 """Dives since a fault that are needed to tell it, and that are looked back over: at 3 h, half a day and two
 days."""
-LEAST_LOSS, LEAST_TURN = 0.15, 0.12
+LEAST_LOSS, LEAST_TURN = 0.2, 0.2
 """Part of the speed, and rad: smaller faults are not told by the fleet. A healthy glider's current is 5 to 10
-% of its speed off."""
+% of its speed off, and eddies that nobody else meets look like as much again."""
 USUAL_SLIP, USUAL_TURN = 0.08, 0.05
 """Part of the speed, and rad: by how much the current of a healthy glider is off, all the time: the angle of
 attack that is not allowed for on board, and how the compass is mounted."""

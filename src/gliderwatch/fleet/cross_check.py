@@ -37,6 +37,7 @@ from gliderwatch.fleet.constants import (
     NEAR,
     SEA_EDDIES,
     SEA_MEAN,
+    SEA_SCALES,
     SEA_TIDE,
     SEA_TIDE_GRADIENT,
     SHARED_SURE,
@@ -44,13 +45,17 @@ from gliderwatch.fleet.constants import (
     USUAL_SLIP,
     USUAL_TURN,
 )
-from gliderwatch.fleet.flow import DiveCurrent, FlowSizes, currents_covariance
+from gliderwatch.fleet.flow import USUAL, DiveCurrent, FlowSizes, currents_covariance, fleet_flow
 from gliderwatch.model import Array, Assessment, Fix, Flag
 from gliderwatch.navigation.geodesy import to_plane
 from gliderwatch.sea.tides import Constituent
 
 _TIDES = (Constituent.M2, Constituent.S2, Constituent.N2, Constituent.K1, Constituent.O1)
-_SEAS = tuple(FlowSizes(eddy, SEA_MEAN, SEA_TIDE, SEA_TIDE_GRADIENT, _TIDES) for eddy in SEA_EDDIES)
+_SEAS = tuple(
+    FlowSizes(eddy, SEA_MEAN, SEA_TIDE, SEA_TIDE_GRADIENT, _TIDES, scale)
+    for scale in SEA_SCALES
+    for eddy in SEA_EDDIES
+)
 
 
 class Fault(StrEnum):
@@ -65,7 +70,7 @@ class Hypothesis:
     """That a ``fault`` of a glider began with a dive (``since``, s), ``dives`` ago.
 
     ``size`` with its standard error ``sigma``: part of the speed that is lost, or rad that the compass shows
-    too much; ``ratio`` twice the log likelihood ratio to no fault.
+    too much; ``ratio`` twice the log likelihood ratio to no fault; ``sea`` the one that suits it best.
     """
 
     glider: str
@@ -75,6 +80,18 @@ class Hypothesis:
     size: float
     sigma: float
     ratio: float
+    sea: FlowSizes = USUAL
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """What moved the water on the last dive of a glider: by its ``own`` current, and by the ``flow`` of the
+    others and of its own before the fault (m/s; east, north), with the standard error of that (m/s, a
+    component)."""
+
+    own: tuple[float, float]
+    flow: tuple[float, float]
+    sigma: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +100,7 @@ class Check:
 
     ``found`` is the likeliest fault of it (None: none is likely), ``others`` the likeliest of another glider,
     ``common`` the likeliest that all have alike (its ``glider`` is empty); ``one_way`` is the length of their
-    mean course.
+    mean course, ``reference`` what a fault of it that is sure is seen by.
     """
 
     neighbours: tuple[str, ...]
@@ -92,6 +109,7 @@ class Check:
     others: Hypothesis | None
     common: Hypothesis | None = None
     one_way: float = 0.0
+    reference: Reference | None = None
 
     @property
     def sure(self) -> Hypothesis | None:
@@ -128,7 +146,7 @@ def cross_check(currents: Sequence[DiveCurrent], glider: str) -> Check | None:
         return None
     found = list(_hypotheses(chosen))
     nearest = min(_distance(each, last) for each in chosen if each.glider != glider)
-    return Check(
+    check = Check(
         neighbours,
         nearest,
         _likeliest(each for each in found if each.glider == glider),
@@ -136,6 +154,18 @@ def cross_check(currents: Sequence[DiveCurrent], glider: str) -> Check | None:
         _likeliest(each for each in found if not each.glider),
         float(np.hypot(*np.mean([each.course for each in chosen], axis=0))),
     )
+    return check if check.sure is None else replace(check, reference=_reference(chosen, last, check.sure))
+
+
+def _reference(currents: Sequence[DiveCurrent], last: DiveCurrent, found: Hypothesis) -> Reference | None:
+    """What a fault of a glider is seen by on its last dive; None where it is not of one glider."""
+    if found.glider != last.glider:
+        return None
+    flow = fleet_flow(currents, last.glider, last.start, last.end, found.sea, found.since)
+    if flow is None:
+        return None
+    u, v = flow.flow.tolist()
+    return Reference((last.u, last.v), (u, v), math.sqrt(float(np.trace(flow.cov)) / 2))
 
 
 def current_of(dive: Assessment, before: Assessment | None) -> DiveCurrent | None:
@@ -188,10 +218,11 @@ def _hypotheses(currents: Sequence[DiveCurrent]) -> Iterator[Hypothesis]:
         sigmas.append(info**-0.5)
     best = np.argmax(likelihoods, axis=0)
     for k, (glider, fault, since, dives, _) in enumerate(tried):
-        size, ratio = float(sizes[best[k]][k]), 2 * (float(likelihoods[best[k]][k]) - plain)
+        sea, size = _SEAS[best[k]], float(sizes[best[k]][k])
+        ratio = 2 * (float(likelihoods[best[k]][k]) - plain)
         if fault is Fault.LOSS and not 0 < size < 1.2:
             continue  # faster than it reckons, or backwards: no loss does that
-        yield Hypothesis(glider, fault, since, dives, size, float(sigmas[best[k]][k]), ratio)
+        yield Hypothesis(glider, fault, since, dives, size, float(sigmas[best[k]][k]), ratio, sea)
 
 
 def _candidates(currents: Sequence[DiveCurrent]) -> Iterator[tuple[str, Fault, float, int, Array]]:

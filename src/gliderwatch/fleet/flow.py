@@ -53,7 +53,8 @@ class FlowSizes:
     """Usual sizes (m/s, a component) of the parts of the flow.
 
     ``eddy`` of one Gaussian, ``mean`` of what is the same everywhere, ``tide`` of a cosine or sine part, and
-    by how much that differs over `FLOW_SCALE` (``gradient``), of each of the ``tides``.
+    by how much that differs over `FLOW_SCALE` (``gradient``), of each of the ``tides``. An eddy has a
+    spread of sqrt(SPREAD) of the ``scale`` (m).
     """
 
     eddy: float = EDDY
@@ -61,10 +62,12 @@ class FlowSizes:
     tide: float = TIDE
     gradient: float = TIDE_GRADIENT
     tides: tuple[Constituent, ...] = TIDES
+    scale: float = FLOW_SCALE
 
     def deviations(self, eddies: int) -> Array:
         """Those of all coefficients, the eddies' first."""
-        plane = [self.tide, self.gradient, self.gradient]
+        gradient = self.gradient * self.scale / FLOW_SCALE
+        plane = [self.tide, gradient, gradient]
         return np.array([self.eddy] * eddies + [self.mean] * 2 + plane * (4 * len(self.tides)))
 
 
@@ -123,19 +126,27 @@ def basis(
     return u, v
 
 
-def fleet_flow(currents: Iterable[DiveCurrent], glider: str, start: Fix, end: Fix) -> FleetFlow | None:
+def fleet_flow(
+    currents: Iterable[DiveCurrent],
+    glider: str,
+    start: Fix,
+    end: Fix,
+    sizes: FlowSizes = USUAL,
+    until: float = -math.inf,
+) -> FleetFlow | None:
     """The mean flow at a dive of ``glider`` between two fixes, from the ``currents`` of others near it.
 
     Those within `NEAR`, and of the last `FLOW_WINDOW`, count; None where there is none. Their order does not
-    matter.
+    matter. Its own that ended ``until`` then (s) count as well: what it expects by itself and what the others
+    measured are weighed by their covariance.
     """
-    others = _near(currents, glider, start, end)
-    if not others:
+    others = _near(currents, glider, start, end, until)
+    if all(each.glider == glider for each in others):
         return None
     dives = [(each.start, each.end) for each in others]
-    centres = _centres([start, end, *(fix for dive in dives for fix in dive)], start)
-    own, own_t = _rows([(start, end)], start, centres, USUAL)
-    seen, seen_t = _rows(dives, start, centres, USUAL)
+    centres = _centres([start, end, *(fix for dive in dives for fix in dive)], start, sizes.scale)
+    own, own_t = _rows([(start, end)], start, centres, sizes)
+    seen, seen_t = _rows(dives, start, centres, sizes)
     fading = len(centres) + 2
     cross = _covariance(own, own_t, seen, seen_t, fading)
     matrix = _covariance(seen, seen_t, seen, seen_t, fading) + _noise(others)
@@ -143,12 +154,14 @@ def fleet_flow(currents: Iterable[DiveCurrent], glider: str, start: Fix, end: Fi
     measured = np.array([[each.u, each.v] for each in others]).ravel()
     cov = _covariance(own, own_t, own, own_t, fading) - gain @ cross.T
     middle = _middle(start, end, start)
-    nearest = min(float(np.hypot(*(_middle(a, b, start) - middle))) for a, b in dives)
+    distances = (
+        np.hypot(*(_middle(each.start, each.end, start) - middle)) for each in others if each.glider != glider
+    )
     return FleetFlow(
         readonly(gain @ measured),
         readonly((cov + cov.T) / 2),
-        tuple(sorted({each.glider for each in others})),
-        nearest,
+        tuple(sorted({each.glider for each in others} - {glider})),
+        float(min(distances)),
     )
 
 
@@ -157,7 +170,7 @@ def currents_covariance(currents: Sequence[DiveCurrent], sizes: FlowSizes) -> Ar
     included."""
     dives = [(each.start, each.end) for each in currents]
     origin = dives[-1][0]
-    centres = _centres([fix for dive in dives for fix in dive], origin)
+    centres = _centres([fix for dive in dives for fix in dive], origin, sizes.scale)
     rows, t = _rows(dives, origin, centres, sizes)
     return _covariance(rows, t, rows, t, len(centres) + 2) + _noise(currents)
 
@@ -175,12 +188,15 @@ def fused(first: tuple[Array, Array], second: tuple[Array, Array]) -> tuple[Arra
     return a + gain @ (b - a), (cov + cov.T) / 2
 
 
-def _near(currents: Iterable[DiveCurrent], glider: str, start: Fix, end: Fix) -> list[DiveCurrent]:
+def _near(
+    currents: Iterable[DiveCurrent], glider: str, start: Fix, end: Fix, until: float
+) -> list[DiveCurrent]:
     """The currents that count, in one order whatever the order they come in."""
     middle, t, found = _middle(start, end, start), (start.t + end.t) / 2, list[tuple[float, DiveCurrent]]()
     for each in currents:
         age = t - (each.start.t + each.end.t) / 2
-        if each.glider == glider or not -FLOW_MEMORY < age < FLOW_WINDOW:
+        is_own = each.glider == glider and each.end.t > until
+        if is_own or not -FLOW_MEMORY < age < FLOW_WINDOW:
             continue
         distance = float(np.hypot(*(_middle(each.start, each.end, start) - middle)))
         if distance <= NEAR:
@@ -198,9 +214,9 @@ def _plane(fixes: Sequence[Fix], origin: Fix) -> Array:
     return to_plane(lat, lon, origin.lat, origin.lon)
 
 
-def _centres(fixes: Sequence[Fix], origin: Fix) -> Array:
-    """Centres of eddies, a sixth of the scale apart, wherever the dives are and one spread about."""
-    places = _plane(fixes, origin) / FLOW_SCALE * (GRID - 1)
+def _centres(fixes: Sequence[Fix], origin: Fix, scale: float = FLOW_SCALE) -> Array:
+    """Centres of eddies, a sixth of the scale (m) apart, wherever the dives are and one spread about."""
+    places = _plane(fixes, origin) / scale * (GRID - 1)
     margin = math.ceil(2 * math.sqrt(SPREAD) * (GRID - 1))
     low, high = np.floor(places.min(axis=0)) - margin, np.ceil(places.max(axis=0)) + margin
     x, y = (np.arange(low[k], high[k] + 1) / (GRID - 1) for k in range(2))
@@ -212,7 +228,7 @@ def _rows(dives: Places, origin: Fix, centres: Array, sizes: FlowSizes) -> tuple
     v (s after the origin's, (2 n,))."""
     a, b = _plane([d[0] for d in dives], origin), _plane([d[1] for d in dives], origin)
     t0, t1 = (np.array([d[k].t for d in dives]) - origin.t for k in range(2))
-    places = (a[:, None] + _ALONG[:, None] * (b - a)[:, None]).reshape(-1, 2) / FLOW_SCALE
+    places = (a[:, None] + _ALONG[:, None] * (b - a)[:, None]).reshape(-1, 2) / sizes.scale
     times = (t0[:, None] + _ALONG * (t1 - t0)[:, None]).ravel()
     mean = [
         np.einsum("npl,p->nl", part.reshape(len(dives), len(_ALONG), -1), _WEIGHTS)

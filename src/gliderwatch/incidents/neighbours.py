@@ -55,6 +55,6 @@ def _begun(
     whose, when = found.glider or "fleet", found.since if found.glider else state.checked // 86400.0
     loud = Severity.CRITICAL if found.fault is Fault.LOSS and found.glider else Severity.WARNING
     identity = f"{whose}/neighbours/{found.fault}/{when:.0f}"
-    content = DiffersFromNeighbours(found, check.neighbours, check.nearest)
+    content = DiffersFromNeighbours(found, check.neighbours, check.nearest, reference=check.reference)
     notice = Notice(identity, identity, glider, state.checked, Kind.NEIGHBOURS, loud, loud, content)
     return replace(state, id=identity, since=state.checked), [notice]

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from math import degrees, exp
 
-from gliderwatch.fleet.cross_check import Fault, Hypothesis
+from gliderwatch.fleet.cross_check import Fault, Hypothesis, Reference
 from gliderwatch.incidents.notices import DiffersFromNeighbours
 from gliderwatch.messages.evidence import CERTAIN
-from gliderwatch.messages.formatting import clean, utc
+from gliderwatch.messages.formatting import clean, flow, utc
 from gliderwatch.messages.phrases import map_of, mute_link, name_of, next_call, where
 from gliderwatch.messages.template import Page, Text, titled
 
@@ -51,6 +51,7 @@ def differs(glider: str, content: DiffersFromNeighbours) -> Text:
                 "Compared with",
                 f"{_names(content.neighbours)}; the next is {content.nearest / 1e3:.0f} km away",
             ),
+            *_water(content.reference),
         ),
         do=_SHARED if shared else _CHECKS[found.fault],
         links=(*(() if last is None else map_of(last.lat, last.lon)), *mute_link(glider)),
@@ -78,6 +79,14 @@ def _amount(fault: Fault, size: float, sigma: float) -> str:
         return f"{100 * size:.0f} % of its speed, ± {196 * sigma:.0f} % (95 %)"
     side = "too much" if size > 0 else "too little"
     return f"{abs(degrees(size)):.0f} degrees {side}, ± {1.96 * degrees(sigma):.0f} (95 %)"
+
+
+def _water(reference: Reference | None) -> tuple[tuple[str, str], ...]:
+    """What moved the water on the last dive, by the others and by itself."""
+    if reference is None:
+        return ()
+    by_others = f"{flow(*reference.flow)}, ± {1.96 * reference.sigma:.2f} m/s (95 %)"
+    return (("Current, last dive", f"by the others {by_others}; by its own {flow(*reference.own)}"),)
 
 
 def _names(names: tuple[str, ...]) -> str:

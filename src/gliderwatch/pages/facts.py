@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from math import isfinite
+from math import degrees, isfinite
 
 from markupsafe import Markup
 
@@ -96,7 +96,18 @@ def of_glider(view: GliderView) -> list[Fact]:
     if _is_foreseen(view) and e is not None and view.now < e.t and e.lat is not None and e.lon is not None:
         facts += [_place("There", e.lat, e.lon)]
     facts += [*last_call(view), *last_dive(view), *battery(view)]
-    return facts if view.waypoint is None else [*facts, _place("Waypoint", *view.waypoint)]
+    facts += [] if view.waypoint is None else [_place("Waypoint", *view.waypoint)]
+    return [*facts, *look_next(view)]
+
+
+def look_next(view: GliderView) -> list[Fact]:
+    """Where it should look next for each field: never sent by itself."""
+    facts = []
+    for field, advice in view.advice:
+        text = f"for {clean(field, 30)}: heading {degrees(advice.heading) % 360:.0f}°"
+        lower = f"takes {100 * advice.variance:.1f} % off the mean variance"
+        facts.append(replace(_place("Look next", advice.lat, advice.lon, text), more=lower))
+    return facts
 
 
 def _place(label: str, lat: float, lon: float, text: str = "") -> Fact:

@@ -8,6 +8,7 @@ from math import inf
 from pathlib import Path
 from types import MappingProxyType
 
+from gliderwatch.fleet.advice import Advice
 from gliderwatch.health.battery import End, battery_end
 from gliderwatch.health.constants import FIT, REMEMBERED
 from gliderwatch.health.readings import History, Readings
@@ -81,7 +82,17 @@ def read_glider(
         section=profiles[0] if profiles is not None and profiles[1] else None,
         layers=profiles[1] if profiles is not None else (),
         battery=_battery_end(readings, battery),
+        advice=_advice(store, name, now) if whole else (),
     )
+
+
+def _advice(store: Store, name: str, now: float) -> tuple[tuple[str, Advice], ...]:
+    """Where a glider should look next, by field, as advised since its last surfacing."""
+    last = store.facts(name).last_surfacing(now)
+    if last is None:
+        return ()
+    found = store.fields.advice(name, last.t_surface)
+    return tuple((field, advice) for field, t, advice in found if t <= now)
 
 
 def _as_of(incident: Incident, now: float) -> Incident:

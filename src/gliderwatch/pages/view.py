@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
+from gliderwatch.fleet.advice import Advice
 from gliderwatch.forecast.constants import GPS_ERROR
 from gliderwatch.health.battery import End
 from gliderwatch.health.readings import Readings
@@ -27,8 +28,9 @@ class GliderView:
     """One glider as known at ``now`` (s): its last ``dives`` that ended and ``incidents``, in order of time,
     who took them on (``acks``), the next surfacing ``expected``, the call ``awaited``, its ``calls`` and the
     text of the ``log`` of the last one, the newest ``alerts`` first, and what people were ``notified`` of;
-    ``waypoint`` (degrees) where it is bound; ``readings`` of its health, when its ``battery`` ends, and the
-    ``section`` of a property along its way with the ``layers`` found and advised after each profile."""
+    ``waypoint`` (degrees) where it is bound; ``readings`` of its health, when its ``battery`` ends, the
+    ``section`` of a property along its way with the ``layers`` found and advised after each profile, and by
+    field where it should look next since its last surfacing (``advice``)."""
 
     name: str
     now: float
@@ -47,6 +49,7 @@ class GliderView:
     section: Section | None = None
     layers: tuple[LayerAdvice, ...] = ()
     battery: End | None = None
+    advice: tuple[tuple[str, Advice], ...] = ()
 
     @property
     def latest(self) -> Assessment | None:
