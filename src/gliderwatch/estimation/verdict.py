@@ -448,7 +448,8 @@ def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: S
     own = info.seen.own_speed()
     if own is not None and own[1] < (2 if info.seen.is_free else 1) * OWN_SURE * own[0]:
         state = replace(state, ratios=learn_ratios(state.ratios, dive.features, own[0]))
-    if params.learning is None or info.proven is not None:
+    # where a surfacing was not seen several dives are one, perhaps the short ones of a launch
+    if params.learning is None or info.proven is not None or dive.features.surfacing_unseen:
         return state
     before = state.filter.dives - 1 if state.filter else 0
     normal = learn(state.normal, info.estimate.speed, at, dive.features.duration, params.learning, before)
