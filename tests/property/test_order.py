@@ -15,6 +15,7 @@ from gliderwatch.navigation.dives import Navigation, extend
 from gliderwatch.params import AnomalyRule, FalseAlarmRule, GliderParams, RuleParams
 from gliderwatch.pipeline import digest
 from gliderwatch.service.routing import Routing
+from gliderwatch.service.transaction import tick
 from gliderwatch.store import codec, segments
 from missions import REAL, Ending, Leg, cut, ending, feed, mission, real
 
@@ -145,6 +146,8 @@ def test_no_message_twice_in_any_order(there):
     ids = [a.id for a in store.alerts()]
     assert len(ids) == len(set(ids)) == len(store.undelivered())
     assert_same(ending(store, "unit"), ending(feed(whole, EAGER), "unit"))
+    if (settles := store.notified("unit").settles) is not None:  # a change of mind waits for an hour
+        tick(store, "unit", spoken, (), settles)
     open_now = {i.id for i in store.incidents("unit") if i.cleared_at is None}
     told = {
         t.reported.id
