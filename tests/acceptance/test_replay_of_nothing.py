@@ -54,6 +54,16 @@ def test_a_cache_that_is_nowhere(dockserver: Path, tmp_path: Path) -> None:
     assert nothing(command("run", "--replay", folder)).endswith("name its folder: --cache FOLDER")
 
 
+def test_a_cache_that_is_cut_is_named_whole_with_its_cure(dockserver: Path, tmp_path: Path) -> None:
+    for path in (dockserver / "gliders").rglob("*.sbd"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    for path in (dockserver / "cache").glob("*.cac"):
+        (tmp_path / path.name).write_bytes(path.read_bytes()[:2000])
+    told = nothing(command("run", "--replay", tmp_path))
+    assert "it is cut or changed" in told
+    assert told.endswith("copy it from the glider or the dockserver again; then replay again")
+
+
 def test_only_garbage(tmp_path: Path) -> None:
     for n in range(25):
         (tmp_path / f"{n}.sbd").write_text("to whom it may concern\n" * 9, encoding="utf-8")

@@ -40,7 +40,7 @@ def unassessed(store: Store, folders: Iterable[Path]) -> str | None:
 def _waiting(files: Sequence[File], folders: Iterable[Path]) -> str:
     wanted = {file.crc.lower() for file in files if file.crc}
     if not wanted:
-        return f"{_number(files)} cannot be read now ({clean(files[0].reason)}): try again later"
+        return f"{_number(files)} cannot be read: {clean(files[0].reason, 500)}; then replay again"
     place = nearby(wanted, folders)
     cure = "name its folder: --cache FOLDER" if place is None else f"add --cache {shlex.quote(_short(place))}"
     lacking = _some(f"{crc}.cac" for crc in wanted)
