@@ -65,7 +65,7 @@ def main() -> None:
     done = subprocess.run(
         [COMMAND, "hindcast", *folders, "--out", options.out / options.estimator.replace(":", "-"), "--json",
          *(["--estimator", options.estimator] if options.estimator != "joint" else
-           ["-c", HERE / "gliderwatch.json"])],
+           ["--settings", HERE / "gliderwatch.json"])],
         check=False, capture_output=True, text=True,
     )  # fmt: skip
     print(done.stderr, file=sys.stderr)

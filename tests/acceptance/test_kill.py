@@ -184,7 +184,7 @@ def pieces(site: Site, mission: Mission, chance: random.Random) -> list[Piece]:
 def of_calls(state: Path) -> list[tuple[object, ...]]:
     """The calls in a state file, what rules of health found, and of which aborts people were notified."""
     with closing(Store.reading(state)) as store:
-        told = [report.what for episode in store.notified("cora").aborts for report in episode.told]
+        told = [report.what for episode in store.notified("cora").aborts for report in episode.reports]
         calls = store.facts("cora").calls(0.0)
         return [calls, store.health.judged("cora"), sorted(told), store.facts("cora").expected(inf)]
 

@@ -64,7 +64,9 @@ def test_every_command_has_an_example_that_can_be_typed(names: tuple[str, ...]) 
         found.make_parser(click.Context(found)).parse_args(args=words[len(names) :])
 
 
-@pytest.mark.parametrize("name", [n for n in main.commands if n not in ("simulate", "score", "layers")])
+@pytest.mark.parametrize(
+    "name", [n for n in main.commands if n not in ("simulate", "score", "layers", "hindcast")]
+)
 def test_the_usual_configuration_is_that_of_every_command(name: str) -> None:
     (option,) = (p for p in main.commands[name].params if "-c" in p.opts)
     assert USUAL in " ".join(command(name, "-h").stdout.split())

@@ -115,6 +115,7 @@ REFUSED: dict[str, tuple[Break, str, str]] = {
         "channels.mail.url",
         "NOT_SET",
     ),
+    "no broker": (settings("relays", broker="http://broker", name="a"), "relays.broker", "mqtt"),
     "a credential": (
         settings("channels", mail={"url": "mailto://a:${credential:pw}@localhost?to=b@c.d"}),
         "channels.mail.url",

@@ -90,7 +90,7 @@ def test_other_settings_begin_anew(tmp_path: Path):
 
 
 def test_a_month_keeps_few_checkpoints_and_a_damaged_one_is_told(tmp_path: Path, monkeypatch):
-    monkeypatch.setattr("gliderwatch.store.fields.RECENT", 3)
+    monkeypatch.setattr("gliderwatch.store.sea.RECENT", 3)
     store = Store.open(tmp_path / "s.sqlite")
     with store.transaction():
         store.fields.put("sst", [batch(k, 7.0 * k, 2) for k in range(24)])

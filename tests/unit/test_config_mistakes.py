@@ -57,9 +57,9 @@ def problems(path: Path) -> list[str]:
         ("gliders: [electa]", "1: gliders: must be a section (`key: value` lines below it)"),
         (
             MINIMAL + "defaults: {zzzz: 1}",
-            "2: defaults.zzzz: unknown key (known are: adaptive, detection, estimator, health, neighbours, "
-            "normal_speed, overdue_hours, preset, reference, rules, surfacing_hours, unknown_dives, "
-            "unknown_hours)",
+            "2: defaults.zzzz: unknown key (known are: adaptive, battery, detection, estimator, health, "
+            "neighbours, normal_speed, overdue_hours, preset, reference, rules, surfacing_hours, "
+            "unknown_dives, unknown_hours)",
         ),
         (MINIMAL + "defaults: {paths: [/d]}", "2: defaults.paths: unknown key (known are: adaptive"),
         (MINIMAL + "stat: {}", "2: stat: unknown key (did you mean `state`?)"),

@@ -21,6 +21,11 @@ from gliderwatch.store.state_file import File, Status
 LEVELS = {"debug", "info", "warning", "error", "critical", "exception"}
 KEYS = {"path", "paths", "glider", "gliders", "alert", "channel"}
 OF_THE_SERVICE = {
+    "batch left alone",  # of another relay, which the line names
+    "batches cannot be exchanged",
+    "broker connected",
+    "broker not connected: batches wait in the state file",
+    "broker takes no messages",
     "decoder is stuck: no sign of life given",
     "dispatcher is stuck: no sign of life given",
     "ended by an error",
@@ -29,6 +34,7 @@ OF_THE_SERVICE = {
     "heartbeat not given",  # its URL is a secret
     "inotify lost events, all folders are watched again",
     "map file cannot be used",  # the reason names it
+    "message of another relay left alone",
     "metrics are not served",
     "metrics are served",
     "observer died, started again",
@@ -36,6 +42,7 @@ OF_THE_SERVICE = {
     "state can be used again",
     "state cannot be used, tried again",
     "stopped",
+    "virtual AIS not given out",
     "what is older than state.keep_days is removed",
 }
 """Lines that are about no file, glider, message or channel."""

@@ -27,9 +27,7 @@ from gliderwatch.errors import GliderwatchError
 @click.option(
     "--estimator", default="joint", help="joint, adaptive, or adaptive:PRESET of the papers (joint)."
 )
-@click.option(
-    "-c", "--config", "settings", type=FILE, help="A configuration, for the settings of its gliders."
-)
+@click.option("--settings", type=FILE, help="A configuration, for the settings of its gliders.")
 @click.option("--cluster", help="Address of a Dask scheduler; else a worker a core here.")
 @click.option("--workers", type=click.IntRange(1), help="Workers here (one a core).")
 @click.option("--json", "as_json", is_flag=True, help="Results as JSON, a line a mission.")

@@ -86,6 +86,7 @@ class Connection:
     def __init__(self, broker: Broker, name: str, topics: Sequence[str], ears: Ears) -> None:
         self._client = _client(broker, f"gliderwatch-{name}")
         self._broker, self._topics, self._ears = broker, tuple(topics), ears
+        self._refused = False
         self._client.on_connect = self._on_connect
         self._client.on_connect_fail = self._on_failure
         self._client.on_disconnect = self._on_disconnect
@@ -112,6 +113,7 @@ class Connection:
     def _on_connect(self, client: Any, _data: Any, _flags: Any, code: Any, _properties: Any) -> None:
         from paho.mqtt.subscribeoptions import SubscribeOptions  # noqa: PLC0415 (an extra)
 
+        self._refused = code.is_failure
         if code.is_failure:
             self._ears.up(False, str(code))
             return
@@ -122,7 +124,9 @@ class Connection:
         self._ears.up(False, _words(sys.exc_info()[1]))
 
     def _on_disconnect(self, _client: Any, _data: Any, _flags: Any, code: Any, _properties: Any) -> None:
-        self._ears.up(False, _LOST.get(str(code), str(code)) if code.is_failure else "")
+        # A broker that refuses closes the connection then: the reason is the one that it gave before.
+        if not self._refused:
+            self._ears.up(False, _LOST.get(str(code), str(code)) if code.is_failure else "")
 
 
 def reach(broker: Broker) -> str | None:

@@ -186,8 +186,11 @@ class GliderFacts:
             yield Unjudged(row[0], row[1], cause, row[3], row[4])
 
     def _empty(self, since: float) -> Iterator[Unjudged]:
-        """Segments of which a file was taken that holds nothing."""
-        sql = "SELECT opened_at, at FROM heard WHERE glider = ? AND opened_at > ? AND last_t <= opened_at"
+        """Segments of which a file was taken that holds nothing, but the newest: it may still grow."""
+        sql = (
+            "SELECT opened_at, at FROM heard h WHERE glider = ? AND opened_at > ? AND last_t <= opened_at "
+            "AND EXISTS (SELECT 1 FROM heard n WHERE n.glider = h.glider AND n.opened_at > h.opened_at)"
+        )
         for row in self._db.execute(sql, (self.glider, since)):
             yield Unjudged(row[0], row[1], Unusable.DATA_MISSING, "its file holds no data")
 
