@@ -87,8 +87,9 @@ def _unreadable(error: Exception, kind: type) -> StateError:
         return DamagedError(f"a record of the state file is damaged: {error}")
     return LayoutError(
         f"the state file holds a {getattr(kind, '__name__', kind)} that this gliderwatch cannot read: "
-        f"{type(error).__name__}: {error}. Nothing of it is lost. What to do: install the gliderwatch that "
-        "wrote it, start it again, and report this"
+        f"{type(error).__name__}: {error}. Nothing of it is lost. What to do: if an older gliderwatch wrote "
+        "it, start the service of this one on it once, or replay again; else install the one that wrote it, "
+        "and report this"
     )
 
 
