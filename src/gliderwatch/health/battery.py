@@ -10,7 +10,6 @@ from math import inf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from gliderwatch.health.constants import BLOCK, CONFIDENCE, DAY, FIT, FULL, LEAST_BLOCKS, THRUSTER
 from gliderwatch.health.readings import History
@@ -138,6 +137,8 @@ def _fit(name: str, series: Series, threshold: float, thruster: Series) -> End |
     left = float(np.median(part.v[-3:])) - threshold
     if mean <= 0:
         return None
+    from scipy.special import stdtrit  # noqa: PLC0415 (slow to load, and every command loads this module)
+
     reach = float(stdtrit(len(rates) - 1, CONFIDENCE)) * sqrt(variance)
     left = max(left, 0.0)
     return End(

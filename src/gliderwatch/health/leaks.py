@@ -6,7 +6,6 @@ Limits: operators' checklists, abort files, and the ranges measured on five heal
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import ndtr, stdtrit
 
 from gliderwatch.health.constants import (
     ATMOSPHERE,
@@ -108,6 +107,8 @@ def trend(t: Array, v: Array) -> tuple[float, float, float]:
     residuals that follow each other: with their correlation r there are as many independent values as
     n (1 - r) / (1 + r), and Student's t of those.
     """
+    from scipy.special import ndtr, stdtrit  # noqa: PLC0415 (slow to load, and every command loads this module)
+
     x = t - t.mean()
     weights = np.ones_like(v)
     for _ in range(5):

@@ -9,7 +9,6 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
 
 from gliderwatch.health.constants import (
     APPROACH,
@@ -148,6 +147,8 @@ def _turns(altitude: Series) -> Series:
     """
     if not len(altitude):
         return EMPTY
+    from scipy.signal import find_peaks  # noqa: PLC0415 (slow to load, and every command loads this module)
+
     lowest: list[int] = []
     edges = [0, *(1 + np.flatnonzero(np.diff(altitude.t) > OUT_OF_RANGE)).tolist(), len(altitude)]
     for i, j in pairwise(edges):
