@@ -218,8 +218,7 @@ def delays(full: Sequence[Found], online: Sequence[Found]) -> tuple[tuple[str, f
     which lasted at the same time; None: they did not."""
 
     def later(one: Found) -> float | None:
-        end = np.inf if one.cleared_at is None else one.cleared_at
-        same = [o for o in online if o.kind == one.kind and o.since <= end and _end(o) >= one.since]
+        same = [o for o in online if o.kind == one.kind and o.since <= _end(one) and _end(o) >= one.since]
         return min((o.opened_at - one.opened_at) / 3600 for o in same) if same else None
 
     return tuple((one.kind, later(one)) for one in full)
