@@ -14,10 +14,8 @@ from fsspec.implementations.local import LocalFileSystem
 
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.service.replay_files import find_files
+from gliderwatch.slocum.folders import kind
 from gliderwatch.slocum.header import read_header
-
-FULL = frozenset({".dbd", ".dcd"})
-"""Endings of the files that are read out of a glider after its recovery; all others come while it flies."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +67,9 @@ def _kinds(paths: Sequence[Path]) -> dict[str, set[bool]]:
 
 
 def is_full(path: Path) -> bool:
-    """Whether a file was read out of the glider after its recovery."""
-    return path.suffix.lower() in FULL
+    """Whether a file of flight data was read out of the glider after its recovery; others come while it
+    flies."""
+    return kind(path.name) == "dbd"
 
 
 def _unlike(name: str, others: Iterable[Mission]) -> str:
