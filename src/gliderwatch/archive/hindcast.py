@@ -103,7 +103,6 @@ class Evidence:
     delayed: Delayed | None
     measured: tuple[MeanCurrent, ...]
     centres: Array
-    sigma: float
 
     @property
     def best(self) -> tuple[Assessment, ...]:
@@ -119,7 +118,7 @@ def hindcast(mission: Mission, out: Path, estimator: str, settings: Path | None)
     """
     assessed: dict[str, tuple[Assessment, ...]] = {"online": (), "full": ()}
     judged = dict[str, Judged]()
-    measured, centres, sigma = list[MeanCurrent](), readonly(np.empty((0, 2))), 0.0
+    measured, centres = list[MeanCurrent](), readonly(np.empty((0, 2)))
     config = configured(mission.glider, _settings(estimator)) if settings is None else load(settings)
     with local(mission.place) as folder:
         caches = tuple(sorted({path.parent for path in folder.rglob("*") if is_cache(path.name)}))
@@ -141,7 +140,6 @@ def hindcast(mission: Mission, out: Path, estimator: str, settings: Path | None)
             f"{mission.place}: no dive of {mission.glider} could be judged: see why by "
             f"gliderwatch run --replay {mission.place}"
         )
-    sigma = config.glider(mission.glider).learner.sigma
     delayed = smooth(measured, FlowParams()) if len(measured) > 1 else None
     both = "online" in judged and "full" in judged
     found = Hindcast(
@@ -154,7 +152,7 @@ def hindcast(mission: Mission, out: Path, estimator: str, settings: Path | None)
         None if delayed is None else float(np.median(delayed.near_real_time.sigma)),
         None if delayed is None else float(np.median(delayed.delayed.sigma)),
     )
-    evidence = Evidence(assessed["online"], assessed["full"], delayed, tuple(measured), centres, sigma)
+    evidence = Evidence(assessed["online"], assessed["full"], delayed, tuple(measured), centres)
     return found, evidence
 
 
