@@ -50,7 +50,6 @@ _QUIET = replace(NOBODY, limits=lambda glider: {})
 _FLAGS = {Kind.ANOMALY: 1, Kind.FALSE_ALARM: 2}
 _NOT_SCORED = (
     "delivery/channels.py",
-    "cli/tables.py",
     "delivery/mail.py",
     "delivery/dispatcher.py",
     "cli/main.py",
