@@ -17,13 +17,14 @@ from pathlib import Path
 
 import numpy as np
 from common import machine
-from flights import HOUR, SEAS, judged, navigated, of, read
+from flights import HOUR, SEAS, judged, of, read
 
 from gliderwatch.estimation.dive_measurement import observe
 from gliderwatch.forecast.constants import CHI2_COVERED
 from gliderwatch.model import Array, Dive, readonly
 from gliderwatch.papers import two_stage
 from gliderwatch.papers.two_stage import TwoStageParams
+from gliderwatch.score.graft import navigate
 from gliderwatch.sea import flow_forecast, gauss_markov
 from gliderwatch.sea.flow_forecast import Currents, Parameters, forecasts, learn, predict
 from gliderwatch.sea.gauss_markov import FlowParams
@@ -103,7 +104,7 @@ def simulated(sea: Sea, seed: int, days: float) -> list[Seen]:
     mission = simulate(Scenario(seed=seed, days=days, sea=sea))
     with tempfile.TemporaryDirectory(prefix="gliderwatch-benchmark-") as folder:
         write_mission(Path(folder) / "gliders", Path(folder) / "cache", mission)
-        dives = navigated(read(Path(folder) / "gliders", Path(folder) / "cache"))
+        dives = navigate(read(Path(folder) / "gliders", Path(folder) / "cache"))
     truth = {d.t_dive: np.array(same.current) for d in dives if (same := of(d, mission.truth)) is not None}
     return seen(dives, truth)
 
@@ -241,7 +242,7 @@ def main() -> None:
     every: list[Row] = []
     if arguments.missions.is_dir():
         for mission in sorted(p for p in arguments.missions.iterdir() if (p / "from-glider").is_dir()):
-            found, cost = rows(seen(navigated(read(mission / "from-glider", mission / "cache"))))
+            found, cost = rows(seen(navigate(read(mission / "from-glider", mission / "cache"))))
             every += found
             print(line(mission.name, found, cost))
         print(line("all real missions", every, 0.0))

@@ -14,12 +14,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from flights import navigated
 from sea_runs import HEALTHY, Job, flight, scenario
 
 from gliderwatch.archive.hindcast import mean_currents
 from gliderwatch.model import Array
 from gliderwatch.navigation.geodesy import to_plane
+from gliderwatch.score.graft import navigate
 from gliderwatch.sea.gauss_markov import FlowParams
 from gliderwatch.sea.smoother import Currents, smooth
 from gliderwatch.simulate.glider import sea_of
@@ -64,7 +64,7 @@ def main() -> None:
         for seed in range(options.first, options.first + options.seeds):
             job = Job(name, seed, HEALTHY, options.days, options.kept)
             flown, made = scenario(job), flight(job)
-            found = smooth(mean_currents(navigated(made.segments)), FlowParams())
+            found = smooth(mean_currents(navigate(made.segments)), FlowParams())
             t = found.delayed.t
             kept = (t > flown.start + 3 * DAY) & (t < made.truth[-1].t_surface)
             real = truth(np.clip(t, flown.start, None), made.truth, flown)

@@ -16,7 +16,7 @@ from gliderwatch.estimation.dive_measurement import observe
 from gliderwatch.estimation.modes import Cause
 from gliderwatch.estimation.verdict import SpeedParams, SpeedState, Verdict, step
 from gliderwatch.model import Current, Dive, Segment, readonly
-from gliderwatch.navigation.dives import Navigation, extend
+from gliderwatch.score.graft import navigate
 from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.flight import Airframe, Point
 from gliderwatch.simulate.glider import simulate
@@ -62,15 +62,6 @@ class Flown:
 # --------------------------------------------------------------------------- from files to verdicts
 
 
-def navigated(segments: Sequence[Segment]) -> list[Dive]:
-    """The dives that ended."""
-    state, dives = Navigation(), dict[float, Dive]()
-    for segment in segments:
-        state, told = extend(state, segment)
-        dives |= {dive.t_dive: dive for dive in told}
-    return [dives[t] for t in sorted(dives) if dives[t].end is not None]
-
-
 def read(folder: Path, cache: Path) -> list[Segment]:
     """The segments below a folder in the order of time, the fullest copy of each, of what can be read."""
     found: dict[str, Segment] = {}
@@ -99,7 +90,7 @@ def fly(name: str, scenario: Scenario, params: SpeedParams = USUAL, roll: bool =
     mission = simulate(scenario)
     with tempfile.TemporaryDirectory(prefix="gliderwatch-benchmark-") as folder:
         write_mission(Path(folder) / "gliders", Path(folder) / "cache", mission)
-        dives = navigated(read(Path(folder) / "gliders", Path(folder) / "cache"))
+        dives = navigate(read(Path(folder) / "gliders", Path(folder) / "cache"))
     if not roll:
         dives = [replace(d, features=replace(d.features, roll_mean=None, roll_std=None)) for d in dives]
     truth = {dive.t_dive: same for dive in dives if (same := of(dive, mission.truth)) is not None}

@@ -28,7 +28,6 @@ from flights import (
     from_,
     incidents,
     judged,
-    navigated,
     off,
     read,
     slowed,
@@ -38,6 +37,7 @@ from flights import (
 from gliderwatch.estimation.kalman import JointParams
 from gliderwatch.estimation.modes import Cause
 from gliderwatch.estimation.verdict import SpeedParams
+from gliderwatch.score.graft import navigate
 from gliderwatch.score.grid import cells, load_grid
 from gliderwatch.simulate.scenario import FaultKind
 
@@ -68,7 +68,7 @@ def real(folder: Path) -> None:
         "\nreal missions, after 12 h    dives flag 1 flag 2 none  NIS    lost 50 %   lost 30 %  0.3 m/s wrong"
     )
     for mission in sorted(p for p in folder.iterdir() if (p / "from-glider").is_dir()):
-        dives = navigated(read(mission / "from-glider", mission / "cache"))
+        dives = navigate(read(mission / "from-glider", mission / "cache"))
         verdicts = judged(dives)
         late = [k for k, d in enumerate(dives) if d.t_dive - dives[0].t_dive > 12 * HOUR]
         flags = [verdicts[k].flag for k in late]

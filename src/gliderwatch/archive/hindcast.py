@@ -17,14 +17,13 @@ from gliderwatch.config import load
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.estimation.dive_measurement import observe
 from gliderwatch.model import Array, Assessment, Dive, Incident, SegmentId, readonly
-from gliderwatch.navigation.dives import Navigation, extend
+from gliderwatch.score.graft import navigate
 from gliderwatch.score.grid import check, configured
 from gliderwatch.sea.gauss_markov import FlowParams
 from gliderwatch.sea.smoother import Delayed, MeanCurrent, smooth
 from gliderwatch.service.replay import Request, replay
 from gliderwatch.service.replay_files import find_files
 from gliderwatch.slocum.folders import is_cache
-from gliderwatch.store.state_file import Store
 
 MONTH = 30 * 86400.0
 SAME = 600.0
@@ -131,7 +130,8 @@ def hindcast(mission: Mission, out: Path, estimator: str, settings: Path | None)
             store = replay(request).store
             assessed[kind] = tuple(store.assessments(mission.glider))
             judged[kind] = judge(assessed[kind], store.incidents(mission.glider))
-            measured = mean_currents(_dives(store, mission.glider)) or measured
+            segments = (store.segments.get(identity) for identity in store.segments.of(mission.glider))
+            measured = mean_currents(navigate(segments)) or measured
             newest, _ = store.segments.resume(SegmentId(float("inf"), mission.glider, ""))
             centres = newest.memory.estimate.learner.centres
             store.close()
@@ -228,15 +228,6 @@ def _end(one: Found) -> float:
 
 def _rms(values: Sequence[float]) -> float | None:
     return float(np.sqrt(np.mean(np.square(values)))) if values else None
-
-
-def _dives(store: Store, glider: str) -> list[Dive]:
-    """The dives of a replay that ended, with what was measured on them."""
-    state, dives = Navigation(), dict[float, Dive]()
-    for identity in store.segments.of(glider):
-        state, found = extend(state, store.segments.get(identity))
-        dives |= {dive.t_dive: dive for dive in found}
-    return [dives[t] for t in sorted(dives) if dives[t].end is not None]
 
 
 def mean_currents(dives: Iterable[Dive]) -> list[MeanCurrent]:
