@@ -18,7 +18,7 @@ from gliderwatch.errors import GliderwatchError
 from gliderwatch.estimation.dive_measurement import observe
 from gliderwatch.model import Array, Assessment, Dive, Incident, SegmentId, readonly
 from gliderwatch.score.graft import navigate
-from gliderwatch.score.grid import check, configured
+from gliderwatch.score.grid import configured, settings_of
 from gliderwatch.sea.gauss_markov import FlowParams
 from gliderwatch.sea.smoother import Delayed, MeanCurrent, smooth
 from gliderwatch.service.replay import Request, replay
@@ -118,7 +118,7 @@ def hindcast(mission: Mission, out: Path, estimator: str, settings: Path | None)
     assessed: dict[str, tuple[Assessment, ...]] = {"online": (), "full": ()}
     judged = dict[str, Judged]()
     measured, centres = list[MeanCurrent](), readonly(np.empty((0, 2)))
-    config = configured(mission.glider, _settings(estimator)) if settings is None else load(settings)
+    config = configured(mission.glider, settings_of(estimator)) if settings is None else load(settings)
     with local(mission.place) as folder:
         caches = tuple(sorted({path.parent for path in folder.rglob("*") if is_cache(path.name)}))
         files = find_files([folder])
@@ -154,11 +154,6 @@ def hindcast(mission: Mission, out: Path, estimator: str, settings: Path | None)
     )
     evidence = Evidence(assessed["online"], assessed["full"], delayed, tuple(measured), centres)
     return found, evidence
-
-
-def _settings(estimator: str) -> dict[str, str]:
-    algorithm, _, preset = check(estimator).partition(":")
-    return {"estimator": algorithm} | ({"preset": preset} if preset else {})
 
 
 def _beside(folder: Path) -> tuple[Path, ...]:

@@ -53,13 +53,17 @@ def configuration(name: str, glider: str, low: float, high: float) -> Config:
     given it (m/s), as good as a pilot could know it. It is read from a file as the pilot's own, so that the
     score knows no setting that a pilot cannot make. Raises GliderwatchError where there is no such estimator.
     """
-    algorithm, _, preset = check(name).partition(":")
-    settings: dict[str, Any] = {"estimator": algorithm}
-    if algorithm != "joint":
+    settings = settings_of(name)
+    if settings["estimator"] != "joint":
         settings["normal_speed"] = {"min": round(low, 4), "max": round(high, 4)}
-    if preset:
-        settings["preset"] = preset
     return configured(glider, settings)
+
+
+def settings_of(name: str) -> dict[str, Any]:
+    """What a configuration says of a glider with an estimator, `joint` or `adaptive:PRESET`, say. Raises
+    GliderwatchError where there is no such estimator."""
+    algorithm, _, preset = check(name).partition(":")
+    return {"estimator": algorithm} | ({"preset": preset} if preset else {})
 
 
 def configured(glider: str, settings: Mapping[str, Any]) -> Config:
