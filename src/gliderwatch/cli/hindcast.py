@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
 import click
 
-from gliderwatch.cli.options import FILE, example
+from gliderwatch.cli.options import FILE, example, progress
 from gliderwatch.errors import GliderwatchError
 
 
@@ -62,11 +60,12 @@ def hindcast(
     found = archive.find(missions)
     out.mkdir(parents=True, exist_ok=True)
     done = list[judging.Hindcast]()
-    with dask_cluster.client(cluster, workers) as client, _bar(len(found)) as advance:
+    with dask_cluster.client(cluster, workers) as client, progress() as bar:
+        row = bar.add_task("missions", total=len(found))
 
         def on_done(_task: archive.Mission, result: judging.Hindcast) -> None:
             done.append(result)
-            advance()
+            bar.advance(row)
 
         work = partial(
             report.make_in, out.resolve(), estimator, None if settings is None else settings.resolve()
@@ -80,17 +79,3 @@ def hindcast(
     click.echo(f"written to {out}: {summary.PAGE}, {summary.TABLE}, and a folder for each mission", err=True)
     if failed:
         sys.exit(1)
-
-
-@contextmanager
-def _bar(total: int) -> Iterator[Callable[[], None]]:
-    """A bar with the time left, where somebody looks; calling what it yields moves it on by one."""
-    from rich.console import Console  # noqa: PLC0415
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn  # noqa: PLC0415
-
-    columns = (TextColumn("missions"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(
-        *columns, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()
-    ) as bar:
-        task = bar.add_task("missions", total=total)
-        yield lambda: bar.advance(task)

@@ -1,10 +1,10 @@
-"""What the commands share: options, where they may write, how they fail, a group whose help is not cut."""
+"""What the commands share: options, where they may write, a bar, how they fail, a group with all its help."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 from rich.console import Console
@@ -12,6 +12,9 @@ from rich.text import Text
 
 from gliderwatch.config import Config, expand
 from gliderwatch.errors import GliderwatchError
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 # ----------------------------------------
 # Where a command may write: never below the folders of a dockserver, whose programs take what lies there.
@@ -32,7 +35,7 @@ def not_on_dockserver(config: Config, file: Path) -> Path:
 
 
 # ----------------------------------------
-# What the commands share: options, how they fail, and a group whose help is whole.
+# What the commands share: options, a bar, how they fail, and a group whose help is whole.
 
 DEFAULT = Path("/etc/gliderwatch/gliderwatch.yml")
 """The configuration where none is named."""
@@ -64,6 +67,23 @@ def example(*lines: str) -> str:
     """Examples of a command, for the end of its help; they keep their lines."""
     return "\b\n" + "\n".join(
         ["Example:" if len(lines) == 1 else "Examples:", *(f"  {line}" for line in lines)]
+    )
+
+
+def progress() -> Progress:
+    """A bar with the time left, on the standard error where somebody looks."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn  # noqa: PLC0415
+
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+        # What is written to a file must not be led to the terminal, where the bar is.
+        redirect_stdout=sys.stdout.isatty(),
+        disable=not sys.stderr.isatty(),
     )
 
 

@@ -10,7 +10,7 @@ import click
 from rich.console import Console
 from rich.text import Text
 
-from gliderwatch.cli.options import DEFAULT, FILE, FOLDER, configured, example
+from gliderwatch.cli.options import DEFAULT, FILE, FOLDER, configured, example, progress
 from gliderwatch.errors import GliderwatchError
 
 # ruff: noqa: PLC0415
@@ -80,8 +80,6 @@ def _serve(path: Path) -> None:
 
 
 def _replay(request: Request) -> None:
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
     from gliderwatch.cli.tables import show_alert
     from gliderwatch.service.replay import STATE, replay
     from gliderwatch.service.transaction import FileOutcome
@@ -91,24 +89,15 @@ def _replay(request: Request) -> None:
         console.print(
             Text(f"{request.out} holds an earlier replay: this one takes its place"), soft_wrap=True
         )
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    # What is written to a file must not be led to the terminal, where the bar is.
-    bar = Progress(
-        *columns,
-        console=Console(stderr=True),
-        transient=True,
-        redirect_stdout=sys.stdout.isatty(),
-        disable=not sys.stderr.isatty(),
-    )
-    with bar as progress:
-        task = progress.add_task("files", total=None)
+    with progress() as bar:
+        task = bar.add_task("files", total=None)
 
         def on_file(outcome: FileOutcome) -> None:
-            progress.advance(task)
+            bar.advance(task)
             for alert in outcome.alerts:
                 show_alert(alert, console)
 
-        report = replay(request, on_total=lambda n: progress.update(task, total=n), on_file=on_file)
+        report = replay(request, on_total=lambda n: bar.update(task, total=n), on_file=on_file)
     _report(report, request, console)
 
 

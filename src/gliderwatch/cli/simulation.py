@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from gliderwatch.cli.options import progress
 from gliderwatch.errors import GliderwatchError
 
 if TYPE_CHECKING:
@@ -135,13 +135,8 @@ def _writable(out: Path) -> None:
 
 
 def _run(tasks: Sequence[Task]) -> list[str]:
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
     from gliderwatch.score.work import run_all
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    console, is_seen = Console(stderr=True), sys.stderr.isatty()
-    with Progress(*columns, console=console, transient=True, disable=not is_seen) as progress:
-        task = progress.add_task("cells", total=len(tasks))
-        return run_all(tasks, lambda: progress.advance(task))
+    with progress() as bar:
+        task = bar.add_task("cells", total=len(tasks))
+        return run_all(tasks, lambda: bar.advance(task))
