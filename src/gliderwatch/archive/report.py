@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 
 import msgspec
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import PackageLoader, Template
 from markupsafe import Markup
 
 from gliderwatch import __version__
@@ -17,6 +17,7 @@ from gliderwatch.errors import GliderwatchError
 from gliderwatch.export import netcdf
 from gliderwatch.figures import panel_svg, plots
 from gliderwatch.messages.formatting import INCIDENTS, utc
+from gliderwatch.messages.template import environment
 from gliderwatch.model import Kind
 
 RESULT, PAGE, PAPER, NUMBERS = "hindcast.json", "report.html", "report.pdf", "figures.nc"
@@ -56,16 +57,12 @@ def write(out: Path, found: Hindcast, evidence: Evidence) -> None:
         ),
         *((panel.name, panel.shows, Markup(panel_svg.svg(panel))) for panel in made),
     ]
-    page = (
-        _environment()
-        .get_template("report.html")
-        .render(
-            found=found,
-            kinds=_kinds(found),
-            pictures=pictures,
-            style=Markup(panel_svg.STYLE),
-            version=__version__,
-        )
+    page = _page().render(
+        found=found,
+        kinds=_kinds(found),
+        pictures=pictures,
+        style=Markup(panel_svg.STYLE),
+        version=__version__,
     )
     (out / PAGE).write_text(page, encoding="utf-8")
     paper = [_cover(found), track, *(plots.page_figure(panel) for panel in made)]
@@ -127,13 +124,7 @@ def _cover(found: Hindcast) -> object:
 
 
 @cache
-def _environment() -> Environment:
-    made = Environment(
-        loader=PackageLoader("gliderwatch.archive"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+def _page() -> Template:
+    made = environment(PackageLoader("gliderwatch.archive"))
     made.filters |= {"utc": utc, "incident": incident, "cm": _cm}
-    return made
+    return made.get_template("report.html")

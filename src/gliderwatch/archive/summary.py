@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import PackageLoader
 
 from gliderwatch import __version__
 from gliderwatch.archive.hindcast import Hindcast, Judged
 from gliderwatch.messages.formatting import utc
+from gliderwatch.messages.template import environment
 
 TABLE, PAGE = "summary.parquet", "summary.html"
 _SCHEMA = pa.schema(
@@ -91,28 +91,13 @@ def write(out: Path, found: Sequence[Hindcast]) -> None:
     ]
     pq.write_table(pa.Table.from_pylist(table, schema=_SCHEMA), out / TABLE)
     months = sum(row.judged.months for row in made)
-    page = (
-        _environment()
-        .get_template("summary.html")
-        .render(
-            rows=made,
-            months=months,
-            anomalies=sum(row.anomalies for row in made),
-            false_alarms=sum(row.false_alarms for row in made),
-            version=__version__,
-        )
+    pages = environment(PackageLoader("gliderwatch.archive"))
+    pages.filters["utc"] = utc
+    page = pages.get_template("summary.html").render(
+        rows=made,
+        months=months,
+        anomalies=sum(row.anomalies for row in made),
+        false_alarms=sum(row.false_alarms for row in made),
+        version=__version__,
     )
     (out / PAGE).write_text(page, encoding="utf-8")
-
-
-@cache
-def _environment() -> Environment:
-    made = Environment(
-        loader=PackageLoader("gliderwatch.archive"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    made.filters["utc"] = utc
-    return made

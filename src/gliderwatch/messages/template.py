@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from html import escape
 
-from jinja2 import Environment, StrictUndefined
+from jinja2 import BaseLoader, Environment, StrictUndefined
 
 from gliderwatch.messages.formatting import clean, duration
 from gliderwatch.model import Alert, Kind
@@ -16,7 +16,15 @@ TITLE = 60
 """Characters of a title at most: a phone shows no more of it."""
 DO = "What to do"
 
-_ENVIRONMENT = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+
+def environment(loader: BaseLoader | None = None) -> Environment:
+    """What renders HTML: every value is escaped, and one that is missing is an error."""
+    return Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, loader=loader
+    )
+
+
+_ENVIRONMENT = environment()
 _HTML = _ENVIRONMENT.from_string(
     """\
 <!DOCTYPE html>

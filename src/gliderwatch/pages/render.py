@@ -13,7 +13,7 @@ from importlib.resources import files
 from types import MappingProxyType
 from urllib.parse import quote
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, pass_context
+from jinja2 import Environment, PackageLoader, pass_context
 from jinja2.runtime import Context
 from markupsafe import Markup
 
@@ -23,6 +23,7 @@ from gliderwatch.figures.coast import Land
 from gliderwatch.figures.plots import Panel
 from gliderwatch.figures.timeline import Bar
 from gliderwatch.messages.formatting import clean, duration, flow, utc
+from gliderwatch.messages.template import environment
 from gliderwatch.model import Assessment, Flag, Severity
 from gliderwatch.pages import facts, maps
 from gliderwatch.pages.call_log import call_log, transferred
@@ -276,13 +277,7 @@ def _near(context: Context, t: float) -> str:
 
 @cache
 def _environment() -> Environment:
-    made = Environment(
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        loader=PackageLoader("gliderwatch.pages"),
-    )
+    made = environment(PackageLoader("gliderwatch.pages"))
     made.filters.update(
         utc=utc,
         clean=clean,
