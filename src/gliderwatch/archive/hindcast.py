@@ -21,7 +21,7 @@ from gliderwatch.score.graft import navigate
 from gliderwatch.score.grid import configured, settings_of
 from gliderwatch.sea.gauss_markov import FlowParams
 from gliderwatch.sea.smoother import Delayed, MeanCurrent, smooth
-from gliderwatch.service.replay import Request, replay
+from gliderwatch.service.replay import Request, caches_in, replay
 from gliderwatch.service.replay_files import find_files
 from gliderwatch.slocum.folders import is_cache
 
@@ -126,7 +126,9 @@ def hindcast(mission: Mission, out: Path, estimator: str, settings: Path | None)
             chosen = tuple(path for path in files if is_full(path) is wanted)
             if not chosen:
                 continue
-            request = Request(chosen, (*caches, *_beside(folder)), config, mission.glider, out / kind)
+            request = Request(
+                chosen, (*caches, *caches_in(folder.resolve().parent)), config, mission.glider, out / kind
+            )
             store = replay(request).store
             assessed[kind] = tuple(store.assessments(mission.glider))
             judged[kind] = judge(assessed[kind], store.incidents(mission.glider))
@@ -154,11 +156,6 @@ def hindcast(mission: Mission, out: Path, estimator: str, settings: Path | None)
     )
     evidence = Evidence(assessed["online"], assessed["full"], delayed, tuple(measured), centres)
     return found, evidence
-
-
-def _beside(folder: Path) -> tuple[Path, ...]:
-    """Folders of caches that lie beside a mission's."""
-    return tuple(path for path in folder.resolve().parent.glob("[cC][aA][cC][hH][eE]") if path.is_dir())
 
 
 def judge(dives: Sequence[Assessment], incidents: Iterable[Incident]) -> Judged:

@@ -136,14 +136,19 @@ def cache_folders(request: Request) -> list[Path]:
     if request.config is not None:
         folders += expand(request.config.dockserver.cache)
         folders.append(lists_folder(Path(request.config.state.path)))
+    looked_into = set[Path]()  # where thousands of files are named, few folders hold them
     for folder in request.folders:
-        around = [
-            folder,
-            *folder.glob("[cC][aA][cC][hH][eE]"),
-            *folder.resolve().parent.glob("[cC][aA][cC][hH][eE]"),
-        ]
-        folders += [f for f in around if f.is_dir()]
+        folders += [folder] if folder.is_dir() else []
+        for place in (folder, folder.resolve().parent):
+            if place not in looked_into:
+                looked_into.add(place)
+                folders += caches_in(place)
     return list(dict.fromkeys(folders))
+
+
+def caches_in(folder: Path) -> list[Path]:
+    """The folders in a folder that are called `cache`."""
+    return [path for path in folder.glob("[cC][aA][cC][hH][eE]") if path.is_dir()]
 
 
 @contextmanager
