@@ -77,7 +77,7 @@ def test_what_is_done_is_not_done_again(made: tuple[Path, Mission, Hindcast], mo
     def never(*_: object) -> None:
         raise AssertionError("judged again")
 
-    monkeypatch.setattr(report.hindcast, "hindcast", never)
+    monkeypatch.setattr(report.hindcast, "replays", never)
     assert report.make_in(out.parent, "joint", None, mission) == found
     with pytest.raises(AssertionError, match="judged again"):
         report.make_in(out.parent, "adaptive", None, mission)

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 from gliderwatch import __version__
-from gliderwatch.archive.missions import Mission, is_full, local
+from gliderwatch.archive.missions import Mission, is_full
 from gliderwatch.config import load
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.estimation.dive_measurement import observe
@@ -22,7 +22,6 @@ from gliderwatch.score.grid import configured, settings_of
 from gliderwatch.sea.gauss_markov import FlowParams
 from gliderwatch.sea.smoother import Delayed, MeanCurrent, smooth
 from gliderwatch.service.replay import Request, caches_in, replay
-from gliderwatch.service.replay_files import find_files
 from gliderwatch.slocum.folders import is_cache
 
 MONTH = 30 * 86400.0
@@ -109,34 +108,51 @@ class Evidence:
         return self.full or self.online
 
 
-def hindcast(mission: Mission, out: Path, estimator: str, settings: Path | None) -> tuple[Hindcast, Evidence]:
-    """Judge a mission again, leaving the results of each replay in `out`.
+@dataclass(frozen=True, slots=True)
+class Replays:
+    """What the replays of a mission left: by kind of files (`online`, `full`) the assessments and what they
+    come to, the currents of its dives, the places of the basis functions (degrees, (n, 2)), the estimator."""
+
+    assessed: dict[str, tuple[Assessment, ...]]
+    judged: dict[str, Judged]
+    measured: list[MeanCurrent]
+    centres: Array
+    estimator: str
+
+
+def replays(
+    mission: Mission, folder: Path, files: Sequence[Path], out: Path, estimator: str, settings: Path | None
+) -> Replays:
+    """Replay the `files` of a mission, which lie below `folder`, leaving the results of each replay in `out`.
 
     `estimator` is `joint`, `adaptive`, or `adaptive:PRESET`; where `settings` names a configuration, what it
-    says of the glider counts instead. Raises GliderwatchError where nothing can be judged.
+    says of the glider counts instead.
     """
     assessed: dict[str, tuple[Assessment, ...]] = {"online": (), "full": ()}
     judged = dict[str, Judged]()
     measured, centres = list[MeanCurrent](), readonly(np.empty((0, 2)))
     config = configured(mission.glider, settings_of(estimator)) if settings is None else load(settings)
-    with local(mission.place) as folder:
-        caches = tuple(sorted({path.parent for path in folder.rglob("*") if is_cache(path.name)}))
-        files = find_files([folder])
-        for kind, wanted in (("online", False), ("full", True)):
-            chosen = tuple(path for path in files if is_full(path) is wanted)
-            if not chosen:
-                continue
-            request = Request(
-                chosen, (*caches, *caches_in(folder.resolve().parent)), config, mission.glider, out / kind
-            )
-            store = replay(request).store
-            assessed[kind] = tuple(store.assessments(mission.glider))
-            judged[kind] = judge(assessed[kind], store.incidents(mission.glider))
-            segments = (store.segments.get(identity) for identity in store.segments.of(mission.glider))
-            measured = mean_currents(navigate(segments)) or measured
-            newest, _ = store.segments.resume(SegmentId(float("inf"), mission.glider, ""))
-            centres = newest.memory.estimate.learner.centres
-            store.close()
+    caches = sorted({path.parent for path in folder.rglob("*") if is_cache(path.name)})
+    caches += caches_in(folder.resolve().parent)
+    for kind, wanted in (("online", False), ("full", True)):
+        chosen = tuple(path for path in files if is_full(path) is wanted)
+        if not chosen:
+            continue
+        store = replay(Request(chosen, tuple(caches), config, mission.glider, out / kind)).store
+        assessed[kind] = tuple(store.assessments(mission.glider))
+        judged[kind] = judge(assessed[kind], store.incidents(mission.glider))
+        segments = (store.segments.get(identity) for identity in store.segments.of(mission.glider))
+        measured = mean_currents(navigate(segments)) or measured
+        newest, _ = store.segments.resume(SegmentId(float("inf"), mission.glider, ""))
+        centres = newest.memory.estimate.learner.centres
+        store.close()
+    used = estimator if settings is None else config.glider(mission.glider).estimator
+    return Replays(assessed, judged, measured, centres, used)
+
+
+def hindcast(mission: Mission, made: Replays) -> tuple[Hindcast, Evidence]:
+    """What the replays of a mission come to. Raises GliderwatchError where nothing could be judged."""
+    assessed, judged, measured = made.assessed, made.judged, made.measured
     if not any(assessed.values()):
         raise GliderwatchError(
             f"{mission.place}: no dive of {mission.glider} could be judged: see why by "
@@ -147,15 +163,14 @@ def hindcast(mission: Mission, out: Path, estimator: str, settings: Path | None)
     found = Hindcast(
         mission.name,
         mission.glider,
-        estimator if settings is None else config.glider(mission.glider).estimator,
+        made.estimator,
         judged.get("online"),
         judged.get("full"),
         _difference(assessed, judged) if both else None,
         None if delayed is None else float(np.median(delayed.near_real_time.sigma)),
         None if delayed is None else float(np.median(delayed.delayed.sigma)),
     )
-    evidence = Evidence(assessed["online"], assessed["full"], delayed, tuple(measured), centres)
-    return found, evidence
+    return found, Evidence(assessed["online"], assessed["full"], delayed, tuple(measured), made.centres)
 
 
 def judge(dives: Sequence[Assessment], incidents: Iterable[Incident]) -> Judged:
@@ -243,11 +258,10 @@ def mean_currents(dives: Iterable[Dive]) -> list[MeanCurrent]:
     return out
 
 
-def fingerprint(mission: Mission, estimator: str, settings: Path | None) -> str:
-    """A short hash of all that a hindcast rests on: files with their sizes, settings, the version."""
-    with local(mission.place) as folder:
-        listed = [f"{path.name} {path.stat().st_size}" for path in find_files([folder])]
-    chosen = "" if settings is None else settings.read_text(encoding="utf-8")
+def fingerprint(mission: Mission, files: Iterable[Path], estimator: str, chosen: str) -> str:
+    """A short hash of all that a hindcast rests on: files with their sizes, settings (`chosen` is the text of
+    a configuration), the version."""
+    listed = [f"{path.name} {path.stat().st_size}" for path in files]
     parts = [__version__, repr(mission), estimator, chosen, *sorted(listed)]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 

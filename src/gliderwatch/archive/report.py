@@ -12,13 +12,14 @@ from markupsafe import Markup
 from gliderwatch import __version__
 from gliderwatch.archive import drawing, hindcast
 from gliderwatch.archive.hindcast import Evidence, Hindcast, Judged
-from gliderwatch.archive.missions import Mission
+from gliderwatch.archive.missions import Mission, local
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.export import netcdf
 from gliderwatch.figures import panel_svg, plots
 from gliderwatch.messages.formatting import INCIDENTS, utc
 from gliderwatch.messages.template import environment
 from gliderwatch.model import Kind
+from gliderwatch.service.replay_files import find_files
 
 RESULT, PAGE, PAPER, NUMBERS = "hindcast.json", "report.html", "report.pdf", "figures.nc"
 
@@ -27,14 +28,18 @@ def make_in(root: Path, estimator: str, settings: Path | None, mission: Mission)
     """Judge a mission again and write its report into a folder of its own below `root`, or read what an
     earlier run wrote of the same.
 
-    `estimator` and `settings` as `hindcast.hindcast` has them.
+    `estimator` and `settings` as `hindcast.replays` has them.
     Raises GliderwatchError where nothing can be judged, or a file cannot be written.
     """
-    out, key = root / mission.name, hindcast.fingerprint(mission, estimator, settings)
-    done, result = out / f"done-{key}", hindcast.read(out / RESULT)
-    if done.exists() and result is not None:
-        return result
-    found, evidence = hindcast.hindcast(mission, out, estimator, settings)
+    out, chosen = root / mission.name, "" if settings is None else settings.read_text(encoding="utf-8")
+    with local(mission.place) as folder:
+        files = find_files([folder])
+        done = out / f"done-{hindcast.fingerprint(mission, files, estimator, chosen)}"
+        result = hindcast.read(out / RESULT)
+        if done.exists() and result is not None:
+            return result
+        replays = hindcast.replays(mission, folder, files, out, estimator, settings)
+    found, evidence = hindcast.hindcast(mission, replays)
     try:
         write(out, found, evidence)
         for old in out.glob("done-*"):
