@@ -20,7 +20,6 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from gliderwatch.fleet.constants import (
     BETWEEN_DIVES,
@@ -203,6 +202,8 @@ def _hypotheses(currents: Sequence[DiveCurrent]) -> Iterator[Hypothesis]:
     tried = list(_candidates(currents))
     if not tried:
         return
+    from scipy.linalg import cho_factor, cho_solve  # noqa: PLC0415 (slow; every command loads this module)
+
     shapes = np.array([shape for *_, shape in tried]).T
     plain, likelihoods, sizes, sigmas = -math.inf, [], [], []
     healthy = _healthy_errors(currents)

@@ -20,7 +20,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from gliderwatch.fleet.constants import (
     DAC_NOISE,
@@ -143,6 +142,8 @@ def fleet_flow(
     others = _near(currents, glider, start, end, until)
     if all(each.glider == glider for each in others):
         return None
+    from scipy.linalg import cho_factor, cho_solve  # noqa: PLC0415 (slow; every command loads this module)
+
     dives = [(each.start, each.end) for each in others]
     centres = _centres([start, end, *(fix for dive in dives for fix in dive)], start, sizes.scale)
     own, own_t = _rows([(start, end)], start, centres, sizes)

@@ -20,7 +20,6 @@ from functools import cache
 from typing import Literal
 
 import numpy as np
-from scipy.linalg.lapack import dpotrf, dpotri
 
 from gliderwatch.fleet.constants import (
     BIN,
@@ -248,6 +247,8 @@ def inverse(matrix: Array) -> Array:
 
     Raises np.linalg.LinAlgError where it is not positive definite.
     """
+    from scipy.linalg.lapack import dpotrf, dpotri  # noqa: PLC0415 (slow; every command loads this module)
+
     factor, bad = dpotrf(matrix, lower=1)
     half, bad_too = dpotri(factor, lower=1)  # three times as fast as to solve for the unit matrix
     if bad or bad_too:

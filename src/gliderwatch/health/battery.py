@@ -137,7 +137,7 @@ def _fit(name: str, series: Series, threshold: float, thruster: Series) -> End |
     left = float(np.median(part.v[-3:])) - threshold
     if mean <= 0:
         return None
-    from scipy.special import stdtrit  # noqa: PLC0415 (slow to load, and every command loads this module)
+    from scipy.special import stdtrit  # noqa: PLC0415 (slow; every command loads this module)
 
     reach = float(stdtrit(len(rates) - 1, CONFIDENCE)) * sqrt(variance)
     left = max(left, 0.0)

@@ -107,7 +107,7 @@ def trend(t: Array, v: Array) -> tuple[float, float, float]:
     residuals that follow each other: with their correlation r there are as many independent values as
     n (1 - r) / (1 + r), and Student's t of those.
     """
-    from scipy.special import ndtr, stdtrit  # noqa: PLC0415 (slow to load, and every command loads this module)
+    from scipy.special import ndtr, stdtrit  # noqa: PLC0415 (slow; every command loads this module)
 
     x = t - t.mean()
     weights = np.ones_like(v)

@@ -147,7 +147,7 @@ def _turns(altitude: Series) -> Series:
     """
     if not len(altitude):
         return EMPTY
-    from scipy.signal import find_peaks  # noqa: PLC0415 (slow to load, and every command loads this module)
+    from scipy.signal import find_peaks  # noqa: PLC0415 (slow; every command loads this module)
 
     lowest: list[int] = []
     edges = [0, *(1 + np.flatnonzero(np.diff(altitude.t) > OUT_OF_RANGE)).tolist(), len(altitude)]
