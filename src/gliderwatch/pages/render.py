@@ -13,7 +13,7 @@ from importlib.resources import files
 from types import MappingProxyType
 from urllib.parse import quote
 
-from jinja2 import Environment, PackageLoader, pass_context
+from jinja2 import Environment, PackageLoader, StrictUndefined, pass_context
 from jinja2.runtime import Context
 from markupsafe import Markup
 
@@ -23,7 +23,6 @@ from gliderwatch.figures.coast import Land
 from gliderwatch.figures.plots import Panel
 from gliderwatch.figures.timeline import Bar
 from gliderwatch.messages.formatting import clean, duration, flow, utc
-from gliderwatch.messages.template import environment
 from gliderwatch.model import Assessment, Flag, Severity
 from gliderwatch.pages import facts, maps
 from gliderwatch.pages.call_log import call_log, transferred
@@ -107,23 +106,46 @@ def summary(found: Sequence[Verdict]) -> str:
 def glider_page(view: GliderView, frame: Frame, land: Land, take_on: Mapping[str, str] = NOTHING) -> str:
     """The page of one glider; `take_on` has the links by which what goes on can be taken on, by its id, and
     that by which the glider is muted, by its name."""
-    found = verdict(view)
+    return _glider_page(view, frame, _shared(view, land), take_on)
+
+
+def sheet_page(view: GliderView, frame: Frame, land: Land) -> str:
+    """One page to print, of the last day of a glider that is known."""
+    return _sheet_page(view, frame, _shared(view, land))
+
+
+def both_pages(view: GliderView, frame: Frame, land: Land) -> tuple[str, str]:
+    """The page of one glider, and that to print; what both show, its map above all, is made once."""
+    shared = _shared(view, land)
+    return _glider_page(view, frame, shared), _sheet_page(view, frame, shared)
+
+
+def _shared(view: GliderView, land: Land) -> Mapping[str, object]:
+    """What both pages of a glider show."""
+    return {
+        "name": clean(view.name, 40),
+        "verdict": verdict(view),
+        "since": facts.since(view),
+        "page": href(file_of(view.name)),
+        "facts": facts.of_glider(view),
+        "message": facts.actions(view),
+        "map": Markup(chart.svg(maps.of_glider(view), land)),
+    }
+
+
+def _glider_page(
+    view: GliderView, frame: Frame, shared: Mapping[str, object], take_on: Mapping[str, str] = NOTHING
+) -> str:
     span = _span(view)
     past = timeline.svg(f"Timeline of {clean(view.name, 40)}", list(_bars(view)), *span)
     return _render(
         "glider.html",
         frame,
-        name=clean(view.name, 40),
-        verdict=found,
-        since=facts.since(view),
-        page=href(file_of(view.name)),
+        **shared,
         sheet=href(file_of(view.name, "-sheet")),
-        facts=facts.of_glider(view),
-        message=facts.actions(view),
         messages=[facts.message_of(alert) for alert in view.alerts[:MESSAGES]],
         open=[(m, take_on.get(m.id, "")) for m in view.open_matters if m.can_be_taken_on],
         mute=take_on.get(view.name, ""),
-        map=Markup(chart.svg(maps.of_glider(view), land)),
         plots=_plots(view, span),
         section=_section(view, span),
         layers=tuple(reversed(view.layers))[:ROWS],
@@ -135,24 +157,16 @@ def glider_page(view: GliderView, frame: Frame, land: Land, take_on: Mapping[str
     )
 
 
-def sheet_page(view: GliderView, frame: Frame, land: Land) -> str:
-    """One page to print, of the last day of a glider that is known."""
+def _sheet_page(view: GliderView, frame: Frame, shared: Mapping[str, object]) -> str:
     end = view.now if view.latest is None else min(view.now, view.latest.t_surface + DAY)
     some = tuple(d for d in view.dives if d.t_surface > end - DAY)
     span = (end - DAY, end)
     drawn = [panel for panel in dives.panels(some)[:1] if panel.name == "Speed"] if len(some) > 1 else []
-    found = verdict(view)
     return _render(
         "sheet.html",
         frame,
-        name=clean(view.name, 40),
-        verdict=found,
-        since=facts.since(view),
-        page=href(file_of(view.name)),
-        facts=facts.of_glider(view),
-        message=facts.actions(view),
+        **shared,
         day=_day(some),
-        map=Markup(chart.svg(maps.of_glider(view), land)),
         plots=[_plot(panel, span) for panel in drawn],
         rows=tuple(reversed(some))[:12],
         matters=tuple(m for m in reversed(view.matters) if m.over is None or m.over > end - DAY),
@@ -277,7 +291,13 @@ def _near(context: Context, t: float) -> str:
 
 @cache
 def _environment() -> Environment:
-    made = environment(PackageLoader("gliderwatch.pages"))
+    made = Environment(
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        loader=PackageLoader("gliderwatch.pages"),
+    )
     made.filters.update(
         utc=utc,
         clean=clean,

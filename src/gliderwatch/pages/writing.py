@@ -12,7 +12,7 @@ from gliderwatch.errors import GliderwatchError
 from gliderwatch.figures.coast import Land
 from gliderwatch.health.rule import Limits
 from gliderwatch.pages.reading import read_fleet
-from gliderwatch.pages.render import Frame, file_of, fleet_page, glider_page, sheet_page
+from gliderwatch.pages.render import Frame, both_pages, file_of, fleet_page
 from gliderwatch.pages.view import GliderView
 from gliderwatch.params import Attention
 from gliderwatch.store.state_file import Store
@@ -40,8 +40,9 @@ def write_fleet(
 def write_glider(view: GliderView, folder: Path, land: Land) -> None:
     """Write the pages of one glider. Raises GliderwatchError where that cannot be."""
     frame = Frame(view.now, view.now + GLIDER_DUE)
-    put(folder / file_of(view.name), glider_page(view, frame, land))
-    put(folder / file_of(view.name, "-sheet"), sheet_page(view, frame, land))
+    page, sheet = both_pages(view, frame, land)
+    put(folder / file_of(view.name), page)
+    put(folder / file_of(view.name, "-sheet"), sheet)
 
 
 def put(path: Path, text: str) -> None:
