@@ -61,20 +61,16 @@ def looking(config: Config | None, state: Path | None, at: str | None) -> Iterat
     from gliderwatch.pages import reading
     from gliderwatch.store.state_file import Store
 
-    store = Store.reading(state or Path(config.state.path if config is not None else ""))
-    try:
-        with store.guarded():
-            now = time.time()
-            if at is not None:
-                try:
-                    now = moment(at)
-                except ValueError as error:
-                    raise GliderwatchError(f"--at {error}") from None
-            elif state is not None:
-                now = min(now, (reading.last_news(store) or now) + 3600.0)
-            yield store, now
-    finally:
-        store.close()
+    with Store.looking(state or Path(config.state.path if config is not None else "")) as store:
+        now = time.time()
+        if at is not None:
+            try:
+                now = moment(at)
+            except ValueError as error:
+                raise GliderwatchError(f"--at {error}") from None
+        elif state is not None:
+            now = min(now, (reading.last_news(store) or now) + 3600.0)
+        yield store, now
 
 
 @contextmanager
@@ -252,12 +248,8 @@ def field(config_path: Path, name: str, out: Path, at: str | None, state: Path |
         raise click.UsageError(f"--at: {at} {error}") from None
     path = not_on_dockserver(config, out)
     path.parent.mkdir(parents=True, exist_ok=True)
-    store = Store.reading(state if state is not None else Path(config.state.path))
-    try:
-        with store.guarded():
-            written = write_field(store, found[name], path, t)
-    finally:
-        store.close()
+    with Store.looking(state if state is not None else Path(config.state.path)) as store:
+        written = write_field(store, found[name], path, t)
     click.echo(f"{path}: {name} at {utc(written)}")
 
 

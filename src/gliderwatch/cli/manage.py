@@ -31,12 +31,8 @@ from gliderwatch.store.watch_health import schema_version
 @contextmanager
 def reading(config: Config) -> Iterator[Store]:
     """The state of a configuration, for looking only. Raises StateError where there is none."""
-    store = Store.reading(Path(config.state.path))
-    try:
-        with store.guarded():
-            yield store
-    finally:
-        store.close()
+    with Store.looking(Path(config.state.path)) as store:
+        yield store
 
 
 @contextmanager

@@ -295,27 +295,24 @@ def overview(config: Config) -> Overview:
     """Look into the state file of a configuration. Raises StateError where there is none, or one that the
     service has to migrate first."""
     path = Path(config.state.path)
-    store, now = Store.reading(path), time.time()
-    try:
-        with store.guarded():
-            waiting = store.undelivered()
-            names = sorted({*config.gliders, *store.gliders()})
-            silent = set(config.gliders) - set(store.gliders())
-            return Overview(
-                running=is_held(path),
-                silent_for=seconds_silent(path),
-                gliders=tuple(_glider(store, name, config, now) for name in names),
-                files=store.counts(),
-                waiting=tuple(store.files(Status.WAITING)),
-                quarantined=tuple(store.files(Status.QUARANTINED)),
-                unknown=tuple(store.files(Status.UNKNOWN)),
-                undelivered=(*(u for u in waiting if u.held_until <= now), *store.refused(now - WEEK)),
-                held=tuple(u for u in waiting if u.held_until > now),
-                links=linked_gliders(config, silent) if silent else {},
-                relays=None if config.relays.broker is None else store.relays(),
-            )
-    finally:
-        store.close()
+    with Store.looking(path) as store:
+        now = time.time()
+        waiting = store.undelivered()
+        names = sorted({*config.gliders, *store.gliders()})
+        silent = set(config.gliders) - set(store.gliders())
+        return Overview(
+            running=is_held(path),
+            silent_for=seconds_silent(path),
+            gliders=tuple(_glider(store, name, config, now) for name in names),
+            files=store.counts(),
+            waiting=tuple(store.files(Status.WAITING)),
+            quarantined=tuple(store.files(Status.QUARANTINED)),
+            unknown=tuple(store.files(Status.UNKNOWN)),
+            undelivered=(*(u for u in waiting if u.held_until <= now), *store.refused(now - WEEK)),
+            held=tuple(u for u in waiting if u.held_until > now),
+            links=linked_gliders(config, silent) if silent else {},
+            relays=None if config.relays.broker is None else store.relays(),
+        )
 
 
 def _glider(store: Store, name: str, config: Config, now: float) -> GliderStatus:

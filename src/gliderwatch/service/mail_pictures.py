@@ -50,12 +50,8 @@ def draw(job: PictureJob) -> tuple[Picture, ...]:
     from gliderwatch.pages import maps, reading
     from gliderwatch.store.state_file import Store
 
-    store = Store.reading(job.state)
-    try:
-        with store.guarded():
-            view = reading.read_glider(store, job.glider, job.attention, job.now, dives=DIVES, whole=False)
-    finally:
-        store.close()
+    with Store.looking(job.state) as store:
+        view = reading.read_glider(store, job.glider, job.attention, job.now, dives=DIVES, whole=False)
     made = []
     if sum(dive.speed is not None for dive in view.dives) > 1:
         panel = dives.speed(view.dives)

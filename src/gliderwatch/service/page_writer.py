@@ -59,17 +59,14 @@ def write(job: PageJob) -> str:
     from gliderwatch.figures.map_files import land_or_world
     from gliderwatch.store.state_file import Store
 
-    store, now = Store.reading(job.state), time.time()
+    now = time.time()
     land, reason = land_or_world(job.maps)
-    try:
-        with store.guarded():
-            if job.glider:
-                name, limits = job.glider, job.batteries.get(job.glider)
-                write_glider(store, job.folder, name, job.attention[name], limits, now, land)
-            else:
-                write_fleet(store, job.folder, job.attention, job.batteries, now, land)
-    finally:
-        store.close()
+    with Store.looking(job.state) as store:
+        if job.glider:
+            name, limits = job.glider, job.batteries.get(job.glider)
+            write_glider(store, job.folder, name, job.attention[name], limits, now, land)
+        else:
+            write_fleet(store, job.folder, job.attention, job.batteries, now, land)
     return reason
 
 

@@ -56,6 +56,17 @@ class Store:
         """The store at a path, for looking only. Raises StateError where there is none."""
         return cls(read_only(path), path)
 
+    @classmethod
+    @contextmanager
+    def looking(cls, path: Path) -> Iterator[Store]:
+        """Inside, the store at a path for looking only, `guarded`. Raises StateError where there is none."""
+        store = cls.reading(path)
+        try:
+            with store.guarded():
+                yield store
+        finally:
+            store.close()
+
     @property
     def folder(self) -> Path | None:
         """The folder of the state file; None of one in memory."""
