@@ -31,7 +31,7 @@ from gliderwatch.messages.formatting import clean
 from gliderwatch.messages.guide import PAGE
 from gliderwatch.pages import render
 from gliderwatch.pages.guide import guide_page
-from gliderwatch.pages.reading import names_of, read_fleet, read_glider
+from gliderwatch.pages.reading import SHOWN, names_of, read_fleet, read_glider
 from gliderwatch.pages.render import Frame
 from gliderwatch.pages.view import GliderView, worst_first
 from gliderwatch.service.liveness import STALE, is_held, seconds_silent
@@ -95,20 +95,31 @@ class Site:
             return render.fleet_page(self.fleet(frame.now), frame, land_or_world(self.config.maps.files)[0])
         if path == PAGE:
             return guide_page()
-        store = Store.reading(self.state)
-        try:
-            with store.guarded():
-                for name in names_of(store, self.config.gliders):
-                    if path in (render.file_of(name), render.file_of(name, "-sheet")):
-                        attention, battery = self.config.attention(name), self._battery(name)
-                        view = read_glider(store, name, attention, frame.now, battery=battery)
-                        land = land_or_world(self.config.maps.files)[0]
-                        if path == render.file_of(name):
-                            return render.glider_page(view, frame, land, self._take_on(view))
-                        return render.sheet_page(view, frame, land)
-        finally:
-            store.close()
-        raise KeyError(path)
+        view = self._view(path, ("", "-sheet"), "html", frame.now)
+        if view is None:
+            raise KeyError(path)
+        land = land_or_world(self.config.maps.files)[0]
+        if path == render.file_of(view.name):
+            return render.glider_page(view, frame, land, self._take_on(view))
+        return render.sheet_page(view, frame, land)
+
+    def _view(
+        self, path: str, kinds: tuple[str, ...], ending: str, now: float, dives: int = SHOWN
+    ) -> GliderView | None:
+        """What is known of the glider of which a page is, one of these kinds; None where there is none."""
+        with Store.looking(self.state) as store:
+            name = self._named(store, path, kinds, ending)
+            if name is None:
+                return None
+            attention, battery = self.config.attention(name), self._battery(name)
+            return read_glider(store, name, attention, now, dives=dives, battery=battery)
+
+    def _named(self, store: Store, path: str, kinds: tuple[str, ...], ending: str) -> str | None:
+        """The glider of which a page is."""
+        for name in names_of(store, self.config.gliders):
+            if path in {render.file_of(name, kind, ending) for kind in kinds}:
+                return name
+        return None
 
     def _take_on(self, view: GliderView) -> dict[str, str]:
         """The links of a page by which what goes on can be taken on, and the glider muted: signed, so that no
@@ -117,30 +128,21 @@ class Site:
         ids[view.name] = f"{view.name}/mute"
         return {what: f"ack/{links.token(self.key, identity, READERS)}" for what, identity in ids.items()}
 
+    def glider(self, path: str) -> str | None:
+        """The glider that a page explores; None where there is no such page."""
+        with Store.looking(self.state) as store:
+            return self._named(store, path, ("",), "html")
+
     def explored(self, path: str) -> GliderView | None:
         """All that is known of the glider of a page, to be explored; None where there is no such page."""
-        store = Store.reading(self.state)
-        try:
-            with store.guarded():
-                for name in names_of(store, self.config.gliders):
-                    if path == render.file_of(name, ending="json"):
-                        limits, now = self._battery(name), time.time()
-                        attention = self.config.attention(name)
-                        return read_glider(store, name, attention, now, dives=EXPLORED, battery=limits)
-        finally:
-            store.close()
-        return None
+        return self._view(path, ("",), "json", time.time(), EXPLORED)
 
     def fleet(self, now: float, dives: int = 1) -> tuple[GliderView, ...]:
         """All gliders as known at `now` (s), with so many dives of each."""
-        store = Store.reading(self.state)
-        try:
-            with store.guarded():
-                names = names_of(store, self.config.gliders)
-                batteries = {name: self._battery(name) for name in names}
-                return read_fleet(store, names, self.config.attention, now, dives, batteries)
-        finally:
-            store.close()
+        with Store.looking(self.state) as store:
+            names = names_of(store, self.config.gliders)
+            batteries = {name: self._battery(name) for name in names}
+            return read_fleet(store, names, self.config.attention, now, dives, batteries)
 
     def _battery(self, name: str) -> Limits | None:
         return battery_limits(self.config, name)
@@ -238,15 +240,16 @@ async def explore(request: Request) -> Response:
     with suppress(KeyError):
         kept = {"Cache-Control": "max-age=86400"}
         return Response(explorer.script(path), media_type="text/javascript", headers=kept)
-    name, _, ending = path.rpartition(".")
-    data = f"{name}.json"
-    view = await run_in_threadpool(site.explored, data)
-    if view is None or ending not in ("html", "json"):
-        raise HTTPException(404, "There is no such page.")
-    if path == data:
+    if path.endswith(".json"):
+        view = await run_in_threadpool(site.explored, path)
+        if view is None:
+            raise HTTPException(404, "There is no such page.")
         text = await run_in_threadpool(explorer.plots, view)
         return Response(text, media_type="application/json", headers={"Cache-Control": "no-cache"})
-    page = render.explore_page(view.name, render.href(data), view.now)
+    name = await run_in_threadpool(site.glider, path)
+    if name is None:
+        raise HTTPException(404, "There is no such page.")
+    page = render.explore_page(name, render.href(render.file_of(name, ending="json")), time.time())
     return HTMLResponse(page, headers={"Cache-Control": "no-cache", "Content-Security-Policy": DRAWN})
 
 
