@@ -80,17 +80,12 @@ def svg(panel: Panel, span: tuple[float, float] | None = None) -> str:
 
 
 def _scale(panel: Panel, span: tuple[float, float] | None) -> _Scale:
-    """The axes hold all values, but not the far ends of large errors."""
     times = np.concatenate([line.t[np.isfinite(line.v)] for line in panel.lines])
     start, end = span if span is not None else (float(times.min()), float(times.max()))
-    values = [line.v for line in panel.lines] + [v for _, _, v in panel.marked]
-    values += [np.concatenate(panel.band[1:])] if panel.band is not None else []
-    finite = np.concatenate([v[np.isfinite(v)] for v in values])
-    low, high = float(finite.min()), float(finite.max())
-    low = min(low, 0.0) if panel.zero else low
-    room = 0.1 * (high - low) or 0.1 * abs(high) or 1.0
-    bottom = low if panel.zero and low == 0.0 else low - room
-    return _Scale(start, max(end, start + HOUR), bottom, high + room, panel.down)
+    bounds = panel.bounds(0.1)
+    if bounds is None:
+        raise ValueError(f"{panel.name} has no value to show")
+    return _Scale(start, max(end, start + HOUR), *bounds, panel.down)
 
 
 # ----------------------------------------

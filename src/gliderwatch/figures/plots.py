@@ -60,6 +60,21 @@ class Panel:
     zero: bool = False
     down: bool = False
 
+    def bounds(self, room: float) -> tuple[float, float] | None:
+        """The ends of the axis of values, with a part `room` of their range beside them; None where none is.
+
+        It holds all values, but not the far ends of large errors.
+        """
+        values = [line.v for line in self.lines] + [v for _, _, v in self.marked]
+        values += [np.concatenate(self.band[1:])] if self.band is not None else []
+        finite = np.concatenate([v[np.isfinite(v)] for v in values]) if values else np.array([])
+        if not len(finite):
+            return None
+        low, high = float(finite.min()), float(finite.max())
+        low = min(low, 0.0) if self.zero else low
+        beside = room * (high - low) or 0.1 * abs(high) or 1.0
+        return (low if self.zero and low == 0.0 else low - beside), high + beside
+
 
 @cache
 def library() -> Any:
@@ -143,7 +158,9 @@ def _drawn(panel: Panel) -> Any:
         if len(t):
             axis.plot(_dates(t), v, shape, color=colour, markersize=6, label=words, zorder=4)
     axis.set_ylabel(panel.unit)
-    _bounds(axis, panel)
+    bounds = panel.bounds(0.12)
+    if bounds is not None:
+        axis.set_ylim(bounds[::-1] if panel.down else bounds)
     dates = library().dates
     locator = dates.AutoDateLocator(minticks=3, maxticks=6)
     axis.xaxis.set_major_locator(locator)
@@ -168,20 +185,6 @@ def _line(axis: Any, line: Line, colour: str, dashes: str) -> None:
         axis.plot(t, line.v, dashes, color=colour, linewidth=1.2, label=line.label)
     else:
         axis.plot(t, line.v, "o", color=colour, markersize=3.5, label=line.label)
-
-
-def _bounds(axis: Any, panel: Panel) -> None:
-    """The axis holds all values, but not the far ends of large errors."""
-    values = [line.v for line in panel.lines] + [v for _, _, v in panel.marked]
-    values += [np.concatenate(panel.band[1:])] if panel.band is not None else []
-    known = np.concatenate([v[np.isfinite(v)] for v in values]) if values else np.array([])
-    if not len(known):
-        return
-    low, high = float(known.min()), float(known.max())
-    low = min(low, 0.0) if panel.zero else low
-    room = 0.12 * (high - low) or 0.1 * abs(high) or 1.0
-    bottom = low if panel.zero and low == 0.0 else low - room
-    axis.set_ylim((high + room, bottom) if panel.down else (bottom, high + room))
 
 
 def _dates(t: Array) -> Array:
