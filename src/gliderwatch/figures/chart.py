@@ -10,6 +10,7 @@ from math import asinh, atan, ceil, cos, degrees, floor, hypot, pi, radians, sin
 
 import numpy as np
 
+from gliderwatch.figures import panel_svg
 from gliderwatch.figures.coast import Box, Land, depth_lines_in, rings_in
 from gliderwatch.incidents.notices import DriftEllipse
 from gliderwatch.model import Array
@@ -237,7 +238,7 @@ def _depths(view: Frame, land: Land) -> Iterable[str]:
     for text in _depth_texts(parts, grid):
         yield f'<path class="depth" d="{text}"/>'
     for (x, y), depth in depth_labels(parts):
-        yield _text(x, y, f"{depth:g} m", "middle", "halo faint")
+        yield panel_svg.text(x, y, f"{depth:g} m", "middle", "halo faint")
 
 
 def _depth_texts(parts: dict[float, list[Array]], grid: float) -> list[str]:
@@ -287,7 +288,7 @@ def _area(view: Frame, area: DriftEllipse, kind: str, label: str) -> str:
     xy = view.xy(*np.array(outline(area)).T)
     points = " ".join(f"{x:.1f},{y:.1f}" for x, y in xy.tolist())
     top = xy[np.argmin(xy[:, 1])]
-    text = _text(top[0], top[1] - 4, label, "middle", "halo faint") if label else ""
+    text = panel_svg.text(top[0], top[1] - 4, label, "middle", "halo faint") if label else ""
     return f'<polygon class="{escape(kind)}" points="{points}"><title>{escape(label)}</title></polygon>{text}'
 
 
@@ -300,7 +301,7 @@ def _currents(view: Frame, arrows: Sequence[Arrow]) -> Iterable[str]:
         x, y = view.xy(*arrow.place).tolist()
         yield _arrow(x, y, arrow.u * per, -arrow.v * per)
     yield _arrow(WIDTH - 12 - shown * per, HEIGHT - 30, shown * per, 0.0)
-    yield _text(WIDTH - 12, HEIGHT - 36, f"{shown:g} m/s", "end", "halo faint")
+    yield panel_svg.text(WIDTH - 12, HEIGHT - 36, f"{shown:g} m/s", "end", "halo faint")
 
 
 def arrow_scale(arrows: Sequence[Arrow]) -> tuple[float, float]:
@@ -339,7 +340,7 @@ def _marks(view: Frame, marks: Sequence[Mark]) -> Iterable[str]:
         shape += f'd="{_SHAPES[mark.shape]}"/>'
         if mark.label:
             anchor = "end" if is_right else "start"
-            shape += _text(x + (-8 if is_right else 8), y + 4, mark.label, anchor, "halo")
+            shape += panel_svg.text(x + (-8 if is_right else 8), y + 4, mark.label, anchor, "halo")
         yield f'<a href="{escape(mark.link)}">{shape}</a>' if mark.link else shape
 
 
@@ -347,11 +348,11 @@ def _graticule(view: Frame) -> Iterable[str]:
     for x, label in meridians(view):
         yield f'<path class="grid" d="M{x:.1f} 0V{HEIGHT:g}"/>'
         if 24 < x < WIDTH - 24:
-            yield _text(x, 11, label, "middle", "faint halo")
+            yield panel_svg.text(x, 11, label, "middle", "faint halo")
     for y, label in parallels(view):
         yield f'<path class="grid" d="M0 {y:.1f}H{WIDTH:g}"/>'
         if 24 < y < HEIGHT - 40:
-            yield _text(3, y - 3, label, "start", "faint halo")
+            yield panel_svg.text(3, y - 3, label, "start", "faint halo")
 
 
 def meridians(view: Frame) -> Iterable[tuple[float, str]]:
@@ -388,10 +389,10 @@ def _scale(view: Frame) -> Iterable[str]:
     length = km * 1000 / view.metres
     y = HEIGHT - 12
     yield f'<path d="M12 {y - 5:g}V{y:g}H{12 + length:.1f}V{y - 5:g}" fill="none" stroke="currentColor"/>'
-    yield _text(16 + length, y, f"{km:g} km", "start", "halo")
+    yield panel_svg.text(16 + length, y, f"{km:g} km", "start", "halo")
     yield f'<path d="M{WIDTH - 16:g} 34V18M{WIDTH - 20:g} 23L{WIDTH - 16:g} 16L{WIDTH - 12:g} 23" '
     yield 'fill="none" stroke="currentColor" stroke-width="1.5"/>'
-    yield _text(WIDTH - 16, 46, "N", "middle", "halo")
+    yield panel_svg.text(WIDTH - 16, 46, "N", "middle", "halo")
 
 
 def round_number(value: float) -> float:
@@ -402,7 +403,3 @@ def round_number(value: float) -> float:
     """
     ten = 10.0 ** floor(np.log10(value * 1.0000001))
     return float(f"{max(k for k in (1, 2, 5) if k * ten <= value * 1.0000001) * ten:.3g}")
-
-
-def _text(x: float, y: float, label: str, anchor: str, kind: str) -> str:
-    return f'<text class="{kind}" x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{escape(label)}</text>'

@@ -126,14 +126,14 @@ def _axes(panel: Panel, scale: _Scale) -> Iterator[str]:
     for v in ticks(scale.low, scale.high):
         y = float(scale.y(v))
         yield f'<path class="grid" d="M{LEFT:g} {y:.1f}H{WIDTH - RIGHT:g}"/>'
-        yield _text(LEFT - 4, y + 4, f"{v:g}", "end")
+        yield text(LEFT - 4, y + 4, f"{v:g}", "end")
     for t, label in times(scale.start, scale.end):
         x = float(scale.x(t))
         yield f'<path class="grid" d="M{x:.1f} {TOP:g}V{bottom:g}"/>'
         if LEFT - 2 <= x <= WIDTH - RIGHT - 34:  # the name of the axis stands at its end
-            yield _text(x, HEIGHT - 6, label, "middle")
-    yield _text(WIDTH - RIGHT, HEIGHT - 6, "UTC", "end", "faint")
-    yield _text(2, 11, panel.unit, "start", "faint")
+            yield text(x, HEIGHT - 6, label, "middle")
+    yield text(WIDTH - RIGHT, HEIGHT - 6, "UTC", "end", "faint")
+    yield text(2, 11, panel.unit, "start", "faint")
 
 
 def _legend(panel: Panel) -> Iterator[str]:
@@ -155,11 +155,12 @@ def _legend(panel: Panel) -> Iterator[str]:
         return
     x = 2.0
     for label, mark in entries:
-        yield f'<g transform="translate({x:.0f} 22)">{mark}{_text(18, 4, label, "start")}</g>'
+        yield f'<g transform="translate({x:.0f} 22)">{mark}{text(18, 4, label, "start")}</g>'
         x += 24 + CHAR * len(label)
 
 
-def _text(x: float, y: float, label: str, anchor: str, kind: str = "") -> str:
+def text(x: float, y: float, label: str, anchor: str, kind: str = "") -> str:
+    """A label, escaped, that begins, ends or has its middle (`anchor`) at a place."""
     of_class = f' class="{kind}"' if kind else ""
     return f'<text{of_class} x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{escape(label)}</text>'
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gliderwatch.figures.panel_svg import ticks, times
+from gliderwatch.figures.panel_svg import text, ticks, times
 from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.layers.section import Section
 from gliderwatch.model import Array
@@ -143,25 +143,21 @@ def _layers(
 
 def _axes(start: float, end: float, bottom: float) -> Iterator[str]:
     for depth in ticks(0.0, bottom):
-        yield _text(LEFT - 4, _y(depth, bottom) + 4, f"{depth:g}", "end")
+        yield text(LEFT - 4, _y(depth, bottom) + 4, f"{depth:g}", "end")
     for t, label in times(start, end):
         x = _x(t, (start, end))
         if LEFT - 2 <= x <= WIDTH - RIGHT - 34:
-            yield _text(x, HEIGHT - 6, label, "middle")
-    yield _text(WIDTH - RIGHT, HEIGHT - 6, "UTC", "end")
-    yield _text(2, TOP - 4, "depth (m)", "start")
+            yield text(x, HEIGHT - 6, label, "middle")
+    yield text(WIDTH - RIGHT, HEIGHT - 6, "UTC", "end")
+    yield text(2, TOP - 4, "depth (m)", "start")
 
 
 def _key(sensor: str, low: float, high: float) -> Iterator[str]:
     """The colours with the values of the first and the last."""
     unit = UNITS.get(sensor, "")
-    yield _text(2, 11, f"{sensor} ({unit})" if unit else sensor, "start")
+    yield text(2, 11, f"{sensor} ({unit})" if unit else sensor, "start")
     x = WIDTH - RIGHT - 40 - 10.0 * len(COLOURS)
-    yield _text(x - 4, 11, f"{low:.4g}", "end")
+    yield text(x - 4, 11, f"{low:.4g}", "end")
     for k, colour in enumerate(COLOURS):
         yield f'<rect x="{x + 10 * k:.0f}" y="3" width="10" height="9" fill="{colour}"/>'
-    yield _text(x + 10 * len(COLOURS) + 4, 11, f"{high:.4g}", "start")
-
-
-def _text(x: float, y: float, label: str, anchor: str) -> str:
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{escape(label)}</text>'
+    yield text(x + 10 * len(COLOURS) + 4, 11, f"{high:.4g}", "start")
