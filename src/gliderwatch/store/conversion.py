@@ -135,24 +135,24 @@ CONVERTERS: Mapping[type, tuple[Converter, ...]] = {
 it stays in it, for records of every layout are in use somewhere."""
 
 
-def said_of_schema_10(said: Any) -> Any:
+def notified_of_schema_10(notified: Any) -> Any:
     """Schema 10 to 11: what people were notified of is called what it is."""
-    for thread in said.get("threads", ()):
+    for thread in notified.get("threads", ()):
         moved(thread, "told", "reported")
-    for silence in said.get("silences", ()):
+    for silence in notified.get("silences", ()):
         moved(silence, "awaited", "missed")
         moved(silence, "missed.heard", "missed.last_sign")
         moved(silence, "told", "stages")
-    for episode in said.get("aborts", ()):
+    for episode in notified.get("aborts", ()):
         moved(episode, "told", "reports")
-    if said.get("empty") is not None:
-        moved(said, "empty.told", "empty.reported")
-    return said
+    if notified.get("empty") is not None:
+        moved(notified, "empty.told", "empty.reported")
+    return notified
 
 
-ROW_CONVERTERS: Mapping[str, Converter] = {"said_of_schema_10": said_of_schema_10}
+ROW_CONVERTERS: Mapping[str, Converter] = {"notified_of_schema_10": notified_of_schema_10}
 """By name: functions that a migration in `database.MIGRATIONS` may call on the JSON text of a row, as
-``UPDATE said SET data = said_of_schema_7(data)``. Rows have no version of their own: their table has."""
+``UPDATE said SET data = notified_of_schema_7(data)``. Rows have no version of their own: their table has."""
 
 
 def version(kind: type) -> int:

@@ -306,7 +306,7 @@ CREATE INDEX health_in_order ON health (glider, t);
 CREATE INDEX health_to_judge ON health (glider, t) WHERE judged IS NULL;
 """,
     11: """
-UPDATE said SET data = said_of_schema_10(data);
+UPDATE said SET data = notified_of_schema_10(data);
 """,
     12: """
 ALTER TABLE field_batches ADD COLUMN crc INTEGER NOT NULL DEFAULT 0;      -- of id and data
