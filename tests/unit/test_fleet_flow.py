@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gliderwatch.fleet import flow
-from gliderwatch.fleet.flow import DiveCurrent, basis, fleet_flow, fused
+from gliderwatch.fleet.flow import DiveCurrent, basis, fleet_flow
 from gliderwatch.model import Fix
 from gliderwatch.navigation.geodesy import from_plane
 
@@ -109,11 +109,3 @@ def test_a_doubtful_speed_counts_less_along_its_course():
     assert abs(found.flow[0]) < 0.01
     assert found.flow[1] > 0.05
     assert found.cov[0, 0] > 5 * found.cov[1, 1]
-
-
-def test_two_sources_are_weighed_by_their_covariance():
-    mean, cov = fused(
-        (np.array([0.0, 0.0]), np.diag([1.0, 4.0])), (np.array([1.0, 1.0]), np.diag([4.0, 1.0]))
-    )
-    assert mean == pytest.approx([0.2, 0.8])
-    assert cov == pytest.approx(np.diag([0.8, 0.8]))

@@ -13,7 +13,6 @@ ALLOWED = {
     "Store.clock_steps": "tests of clocks that fall back look at it",
     "metropolis": "the consensus of paper 003, for comparison: benchmarks/fleet_field.py",
     "mean_variance": "J of paper 003; tests of the gradient look at it",
-    "fused": "two flows that know nothing of each other: tests of the flow of a fleet look at it",
     "is_sent": "benchmarks/sensors.py asks which sensors a mission has",
     "with_fault": "benchmarks/seas.py puts faults into missions by it",
     "Sent.computer": "rules of health read it next",

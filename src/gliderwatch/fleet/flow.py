@@ -176,19 +176,6 @@ def currents_covariance(currents: Sequence[DiveCurrent], sizes: FlowSizes) -> Ar
     return _covariance(rows, t, rows, t, len(centres) + 2) + _noise(currents)
 
 
-def fused(first: tuple[Array, Array], second: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Flow ((2,)) and covariance ((2, 2)) of two sources that know nothing of each other.
-
-    >>> flow, cov = fused((np.zeros(2), np.eye(2)), (np.ones(2), np.eye(2)))
-    >>> flow.tolist(), cov.diagonal().tolist()
-    ([0.5, 0.5], [0.5, 0.5])
-    """
-    (a, p), (b, q) = first, second
-    gain = np.linalg.solve((p + q).T, p.T).T
-    cov = p - gain @ p
-    return a + gain @ (b - a), (cov + cov.T) / 2
-
-
 def _near(
     currents: Iterable[DiveCurrent], glider: str, start: Fix, end: Fix, until: float
 ) -> list[DiveCurrent]:
