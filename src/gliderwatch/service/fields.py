@@ -85,8 +85,7 @@ def _field(config: Config, name: str) -> FleetField:
 def take_from_relays(store: Store, field: FleetField, batches: Sequence[Batch]) -> bool:
     """Put batches of other relays into a field, in a transaction of its own; whether there was news."""
     with store.transaction():
-        if store.fields.begin(field.name, field.key):
-            store.fields.put(field.name, _all_batches(store, field), is_shared=field.is_shared)
+        _begin(store, field)
         return store.fields.put(field.name, batches)
 
 
@@ -104,8 +103,7 @@ def add(store: Store, fields: Sequence[FleetField], segment: Segment) -> None:
     A field whose settings have changed is made again from all segments that are held.
     """
     for field in fields:
-        if store.fields.begin(field.name, field.key):
-            store.fields.put(field.name, _all_batches(store, field), is_shared=field.is_shared)
+        _begin(store, field)
         batch = batch_of(segment, field.sensor, field.box)
         if batch is not None:
             store.fields.put(field.name, [batch], is_shared=field.is_shared)
@@ -130,6 +128,12 @@ def look(
         if found is not None:
             out.append(FieldAdvice(field.name, glider, t, found, field.outputs))
     return tuple(out)
+
+
+def _begin(store: Store, field: FleetField) -> None:
+    """Make a field again from all segments that are held where its settings have changed."""
+    if store.fields.begin(field.name, field.key):
+        store.fields.put(field.name, _all_batches(store, field), is_shared=field.is_shared)
 
 
 def _all_batches(store: Store, field: FleetField) -> Iterator[Batch]:
