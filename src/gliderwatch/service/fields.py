@@ -20,7 +20,7 @@ from gliderwatch.fleet.batches import Sensor, batch_of, params_of, whereabouts
 from gliderwatch.fleet.constants import BIN, NO_MORE_AT_SEA, SENSORS_OF_FIELDS, USUAL_LEG
 from gliderwatch.fleet.scalar_field import Batch, Checkpoint, FieldParams, at, estimate
 from gliderwatch.forecast.outlook import look_ahead
-from gliderwatch.model import Array, Segment, SegmentId, readonly
+from gliderwatch.model import Array, Segment, readonly
 from gliderwatch.navigation.geodesy import to_plane
 from gliderwatch.pipeline import GliderState
 from gliderwatch.store.state_file import Store
@@ -138,7 +138,7 @@ def _begin(store: Store, field: FleetField) -> None:
 
 def _all_batches(store: Store, field: FleetField) -> Iterator[Batch]:
     for glider in store.gliders():
-        for identity in store.segments.resume(SegmentId(-inf, glider, ""))[1]:
+        for identity in store.segments.of(glider):
             batch = batch_of(store.segments.get(identity), field.sensor, field.box)
             if batch is not None:
                 yield batch

@@ -305,7 +305,7 @@ class Segments:
             (first.glider, first.opened_at, first.name),
         ).fetchone()
         if row is None:
-            return GliderState(), self._after(first.glider, float("-inf"), "")
+            return GliderState(), self.of(first.glider)
         return codec.decode(row[2], GliderState), self._after(first.glider, row[0], row[1])
 
     def of(self, glider: str) -> list[SegmentId]:
