@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Mapping
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from gliderwatch.fleet.exchange import Day, Sample
 from gliderwatch.store import codec
-from gliderwatch.store.database import connect, guarded, has_table, read_only
+from gliderwatch.store.database import connect, guarded, has_table
+from gliderwatch.store.watch_health import reading
 
 DAY = 86400.0
 
@@ -115,7 +115,7 @@ class RelayRows:
 
 def exchange(state: Path) -> RelayState:
     """How the exchange stands, by a state file. Raises StateError."""
-    with guarded(state), closing(read_only(state)) as db:
+    with reading(state) as db:
         return relay_state(db)
 
 
