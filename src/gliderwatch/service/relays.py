@@ -30,7 +30,6 @@ from gliderwatch.fleet.exchange import (
     Holdings,
     Parcel,
     Request,
-    Sample,
     decode,
     differing,
     encode,
@@ -102,7 +101,8 @@ class RelayExchange:
         self._link = Connection(settings.broker, settings.name, topics, self._ears)
         self._thread = threading.Thread(target=self._run, name="relays", daemon=True)
         self._is_up, self._trouble = False, ""
-        self._on_way: dict[int, tuple[float, list[tuple[str, int, Sample]]]] = {}
+        self._on_way: dict[int, Parcel] = {}
+        self._sent_at = 0.0
         self._version = -1
         self._changed_at: float | None = None
         self._published: dict[str, FieldHoldings] | None = None
@@ -174,18 +174,14 @@ class RelayExchange:
 
     def _send(self, rows: RelayRows, now: float) -> None:
         """Hand new batches to the broker, some at a time."""
-        if any(since < now - PATIENCE for since, _ in self._on_way.values()):
-            self._on_way.clear()
-        if self._on_way:
+        if self._on_way and now <= self._sent_at + PATIENCE:
             return
-        new = rows.to_send(self.settings.fields, AT_ONCE)
-        for field in dict.fromkeys(each[0] for each in new):
-            mine = [each for each in new if each[0] == field]
-            key = self.settings.fields[field]
-            for parcel in parcels(self.settings.name, field, key, (sample for _, _, sample in mine)):
+        self._on_way.clear()
+        self._sent_at = now
+        for field, batches in rows.to_send(self.settings.fields, AT_ONCE).items():
+            for parcel in parcels(self.settings.name, field, self.settings.fields[field], batches):
                 number = self._link.publish(f"{self.settings.topic}/batches", encode(parcel))
-                inside = {sample.id for sample in parcel.batches}
-                self._on_way[number] = now, [each for each in mine if each[2].id in inside]
+                self._on_way[number] = parcel
 
     def _confirmed(self, rows: RelayRows, number: int, why: str) -> None:
         """The broker has taken a message, or not: then it is sent again after `PATIENCE`."""
@@ -196,9 +192,9 @@ class RelayExchange:
                 self._trouble = trouble
                 self._keep_link(rows)
             return
-        _, batches = self._on_way.pop(number, (0.0, []))
-        for field, crc, sample in batches:
-            rows.sent(field, sample.id, crc)
+        parcel = self._on_way.pop(number, None)
+        if parcel is not None:
+            rows.sent(parcel.field, parcel.batches)
 
     def _publish_holdings(self, rows: RelayRows, now: float) -> None:
         """Publish what there is: after a connection, some time after a change, and once in a while."""

@@ -1,19 +1,19 @@
 """What the exchange with other relays reads and keeps in a state file: batches to send, and who has what.
 
 A connection of its own, in the thread of the exchange. Batches that come are put into their field by the
-daemon (`store.fields`).
+daemon (`store.sea.Fields`).
 """
 
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from gliderwatch.fleet.exchange import Day, Sample
 from gliderwatch.store import codec
-from gliderwatch.store.database import connect, guarded, has_table
+from gliderwatch.store.database import connect, crc_of_batch, guarded, has_table
 from gliderwatch.store.watch_health import reading
 
 DAY = 86400.0
@@ -65,21 +65,26 @@ class RelayRows:
         with guarded(self._path):
             return int(self._db.execute("PRAGMA data_version").fetchone()[0])
 
-    def to_send(self, fields: Mapping[str, str], most: int) -> list[tuple[str, int, Sample]]:
-        """Batches of these fields that no broker has yet, with field and checksum; the oldest first."""
+    def to_send(self, fields: Iterable[str], most: int) -> dict[str, list[Sample]]:
+        """Batches of these fields that no broker has yet, ``most`` of them at most; the oldest first."""
         sql = (
-            "SELECT field, crc, id, glider, data FROM field_batches WHERE to_send = 1 AND field = ? "
+            "SELECT id, glider, data FROM field_batches WHERE to_send = 1 AND field = ? "
             "ORDER BY first_t LIMIT ?"
         )
+        found: dict[str, list[Sample]] = {}
         with guarded(self._path):
-            found = [row for field in fields for row in self._db.execute(sql, (field, most))]
-        return [(row["field"], row["crc"], _sample(row)) for row in found[:most]]
+            for field in fields:
+                room = most - sum(map(len, found.values()))
+                found[field] = [_sample(row) for row in self._db.execute(sql, (field, room))]
+        return found
 
-    def sent(self, field: str, identity: str, crc: int) -> None:
-        """A broker has a batch, unless it has become another since."""
+    def sent(self, field: str, batches: Iterable[Sample]) -> None:
+        """A broker has these batches, but for those that have become others since."""
         sql = "UPDATE field_batches SET to_send = 0 WHERE field = ? AND id = ? AND crc = ?"
         with guarded(self._path):
-            self._db.execute(sql, (field, identity, crc))
+            self._db.executemany(
+                sql, [(field, each.id, crc_of_batch(each.id, each.data)) for each in batches]
+            )
 
     def days(self, field: str) -> dict[int, Day]:
         """How many batches of a field there are of each day since 1970, and the sum of their checksums."""
