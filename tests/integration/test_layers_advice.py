@@ -44,7 +44,8 @@ def take(segments: list[Segment], layers: GliderLayers | None = LAYERS) -> Store
 
 
 def rows(store: Store) -> list[Layered]:
-    return store.layers.history("unit_1", 100)
+    """The newest first."""
+    return [layered for _, layered in reversed(store.layers.segments("unit_1", 100))]
 
 
 def test_layers_are_kept_with_each_segment() -> None:

@@ -57,5 +57,5 @@ def learn(store: Store, identity: SegmentId, layers: GliderLayers) -> None:
 
 def newest(store: Store, glider: str, since: float = -inf) -> LayerAdvice | None:
     """The last advice to a glider, if it was given at `since` (s) or later."""
-    found = store.layers.history(glider, 1)
-    return found[0].advice if found and found[0].advice.t >= since else None
+    found = [layered.advice for _, layered in store.layers.segments(glider, 1)]
+    return found[0] if found and found[0].t >= since else None

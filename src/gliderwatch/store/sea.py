@@ -218,11 +218,6 @@ class LayerRows:
             row = (*key, found.advice.t, codec.plain_encode(found))
             self._db.execute("INSERT INTO layers VALUES (?, ?, ?, ?, ?)", row)
 
-    def history(self, glider: str, n: int) -> list[Layered]:
-        """The last `n` of a glider, the newest first."""
-        sql = "SELECT data FROM layers WHERE glider = ? ORDER BY opened_at DESC, segment DESC LIMIT ?"
-        return list(values(self._db, sql, (glider, n), Layered))
-
     def segments(self, glider: str, n: int) -> list[tuple[SegmentId, Layered]]:
         """The last `n` segments of a glider with what was found in each, in order of time."""
         sql = (
