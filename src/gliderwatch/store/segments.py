@@ -356,8 +356,10 @@ class Segments:
     def newest(self, glider: str) -> GliderState | None:
         """The state after the newest segment of a glider; None where there is none, or it is outdated."""
         newest = self.last_before(glider, float("inf"))
-        if newest is None or (ahead := self.ahead.of(newest)) is not None:
-            return None if newest is None else ahead
+        if newest is None:
+            return None
+        if (ahead := self.ahead.of(newest)) is not None:
+            return ahead
         data = self._checkpoint(newest)
         return None if data is None else codec.decode(data, GliderState)
 
