@@ -329,14 +329,14 @@ def _update_of(cov: Array, way: Explained) -> Update:
 def _cov(state: JointState, way: Explained, steps: Array) -> Array:
     """The covariance of the whole state with what an explanation opens."""
     if way.cause is Cause.FLOW:
-        return state.cov + way.size**2 * (steps @ steps.T)
+        return state.cov + way.mode.size**2 * (steps @ steps.T)
     if way.cause is Cause.SPEED:
         cov = state.cov.copy()
-        cov[OWN, OWN] += way.size**2
+        cov[OWN, OWN] += way.mode.size**2
         return cov
     if way.cause is Cause.WING:
         cov = state.cov.copy()
-        cov[[SLIP, SIDE], [SLIP, SIDE]] += np.square([way.size, WING_SIDE])
+        cov[[SLIP, SIDE], [SLIP, SIDE]] += np.square([way.mode.size, WING_SIDE])
         return cov
     return state.cov
 
@@ -350,7 +350,7 @@ def _mixed(state: JointState, ways: list[Explained], steps: Array) -> JointState
         cov = _cov(state, way, steps)
         update = _update_of(cov, way)
         mean = state.x + update.gain @ way.innovation
-        mean[SLIP] += way.loss
+        mean[SLIP] += way.mode.loss
         means.append(mean)
         covs.append(cov - update.gain @ (update.rows @ cov))
     weights = np.array([way.weight / total for way in kept])

@@ -125,21 +125,23 @@ LOST = Mode(Cause.WING, WING_ODDS, LOST_SPREAD, loss=LOST_SLIP)
 class Explained:
     """A dive as one of the modes has it.
 
-    ``cause`` with its ``weight``; ``kinematic_fits``: whether the kinematic speed has to do with W.
-    ``loss`` (part of W) is expected of slip before the dive, ``size`` what is opened. ``rows`` ((m, 5)),
-    ``innovation`` ((m,)) and ``noise`` ((m, m)) are linear about the likeliest state;
+    ``mode`` with its ``weight``; ``kinematic_fits``: whether the kinematic speed has to do with W.
+    ``rows`` ((m, 5)), ``innovation`` ((m,)) and ``noise`` ((m, m)) are linear about the likeliest state;
     ``square`` is the innovation normalised.
     """
 
-    cause: Cause
-    size: float
-    loss: float
+    mode: Mode
     weight: float
     kinematic_fits: bool
     rows: Array
     innovation: Array
     noise: Array
     weight_matrix: Array
+
+    @property
+    def cause(self) -> Cause:
+        """What the mode makes of the dive."""
+        return self.mode.cause
 
     @property
     def square(self) -> float:
@@ -203,29 +205,25 @@ def explain(
         state[:, OWN] = np.clip(free, 0.0, FASTEST)
         state[:, SLIP:] = np.clip(state[:, SLIP:], [LEAST_SLIP, -MOST_SIDE], [MOST_SLIP, MOST_SIDE])
     beyond = np.maximum(np.maximum(-free, free - FASTEST), 0.0)
-    logs = logs - 0.5 * (beyond / BEYOND) ** 2
     squares = np.einsum("ki,kij,kj->k", innovation, inverse, innovation)
-    logs = logs - 0.5 * (np.linalg.slogdet(s)[1] + squares)
-    weights = np.exp(logs - logs.max())
-    weights /= weights.sum()
+    weights = _weights(logs, beyond, np.linalg.slogdet(s)[1] + squares)
     left_out = wrong > 0
     noise = np.where(left_out, LEFT_OUT**2, noise)
     at = np.flatnonzero(left_out.any(axis=(1, 2)))
     inverse[at] = np.linalg.inv(slope[at] @ turned[at] + noise[at])
     return [
-        Explained(
-            mode.cause,
-            mode.size,
-            mode.loss,
-            float(weights[k]),
-            fits_it,
-            slope[k],
-            innovation[k],
-            noise[k],
-            inverse[k],
-        )
+        Explained(mode, float(weights[k]), fits_it, slope[k], innovation[k], noise[k], inverse[k])
         for k, (mode, fits_it) in enumerate(each)
     ]
+
+
+def _weights(logs: Array, beyond: Array, misfits: Array) -> Array:
+    """Weights ((k,)) that add up to 1: by logarithms of the chances, by how far (m/s) the own speed is
+    ``beyond`` what it can be, and by minus twice the logarithms of the likelihoods."""
+    logs = logs - 0.5 * (beyond / BEYOND) ** 2
+    logs = logs - 0.5 * misfits
+    weights = np.exp(logs - logs.max())
+    return np.asarray(weights / weights.sum())
 
 
 def _opened(
