@@ -8,14 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from types import MappingProxyType
-
-import numpy as np
 
 from gliderwatch.model import Call, Fix, Segment, Series, readonly
 from gliderwatch.navigation.constants import FASTEST_OVER_GROUND, FILE_TO_CALL, JUMP, SURFACE_STAY
 from gliderwatch.navigation.fixes import distance
-from gliderwatch.navigation.flight import joined
+from gliderwatch.navigation.flight import concatenated, joined
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,19 +57,14 @@ def with_call(segment: Segment, call: FromCall) -> Segment:
     """The segment with what the call at its end adds."""
     fix, waypoint, more = call.fix, call.waypoint, dict[str, Series]()
     if fix is not None:
-        more |= {"fix_lat": _appended(segment, "fix_lat", fix.t, fix.lat)}
-        more |= {"fix_lon": _appended(segment, "fix_lon", fix.t, fix.lon)}
+        more |= {"fix_lat": _single(fix.t, fix.lat), "fix_lon": _single(fix.t, fix.lon)}
     if waypoint is not None:
         t = segment.last_t if fix is None else fix.t
-        more |= {"waypoint_lat": _appended(segment, "waypoint_lat", t, waypoint[0])}
-        more |= {"waypoint_lon": _appended(segment, "waypoint_lon", t, waypoint[1])}
+        more |= {"waypoint_lat": _single(t, waypoint[0]), "waypoint_lon": _single(t, waypoint[1])}
     if not more:
         return segment
-    return replace(segment, quantities=MappingProxyType({**segment.quantities, **more}))
+    return replace(segment, quantities=concatenated(segment.quantities, more))
 
 
-def _appended(segment: Segment, name: str, t: float, value: float) -> Series:
-    series = segment.get(name)
-    times, values = np.append(series.t, t), np.append(series.v, value)
-    order = np.argsort(times, kind="stable")
-    return Series(readonly(times[order]), readonly(values[order]))
+def _single(t: float, value: float) -> Series:
+    return Series(readonly([t]), readonly([value]))
