@@ -10,7 +10,7 @@ import numpy as np
 
 from gliderwatch.health.constants import BEYOND, MOVED, USUAL_FILES
 from gliderwatch.health.readings import COMMANDED, History
-from gliderwatch.health.rule import Finding, Limit, Limits, Rule, found, loudest, run, spread
+from gliderwatch.health.rule import Finding, Limit, Limits, Rule, below, found, loudest, spread
 from gliderwatch.model import Severity
 
 _DEGREE = float(np.radians(1))
@@ -20,7 +20,7 @@ def _altitude(history: History, limits: Limits) -> Finding | None:
     least, factor = limits["minimum"], limits["factor"]
     if least is None or factor is None:
         return None
-    low = run(history, "altitude", lambda v: v < factor * least)
+    low = below(history, "altitude", factor * least)
     if low is None:
         return None
     limit = f"{factor:g} x the minimum of {least:g} m"

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gliderwatch.health.constants import BLOCK, CONFIDENCE, DAY, FIT, FULL, LEAST_BLOCKS, THRUSTER
 from gliderwatch.health.readings import History
-from gliderwatch.health.rule import Finding, Limit, Limits, Rule, found, run
+from gliderwatch.health.rule import Finding, Limit, Limits, Rule, below, found
 from gliderwatch.model import Array, Series, Severity, readonly
 
 
@@ -35,7 +35,7 @@ class End:
 def _volts(history: History, limits: Limits) -> Finding | None:
     for which, severity in (("critical", Severity.CRITICAL), ("warning", Severity.WARNING)):
         limit = limits[which]
-        low = None if limit is None else run(history, "battery_voltage", lambda v, x=limit: v < x)  # type: ignore[misc]
+        low = below(history, "battery_voltage", limit)
         if low is not None:
             text = f"battery at {low.v[-1]:.2f} V, twice in a row below {limit:.2f} V"
             return found("battery_voltage", severity, float(low.t[0]), text, history, "battery_voltage")
@@ -45,7 +45,7 @@ def _volts(history: History, limits: Limits) -> Finding | None:
 def _charge(history: History, limits: Limits) -> Finding | None:
     for which, severity in (("critical", Severity.CRITICAL), ("warning", Severity.WARNING)):
         limit = limits[which]
-        low = None if limit is None else run(history, "battery_charge", lambda v, x=limit: v < x)  # type: ignore[misc]
+        low = below(history, "battery_charge", limit)
         if low is not None:
             text = f"charge {100 * low.v[-1]:.1f} %, twice in a row below {100 * (limit or 0):.0f} %"
             return found("battery_charge", severity, float(low.t[0]), text, history, "battery_charge")

@@ -9,7 +9,7 @@ import numpy as np
 
 from gliderwatch.health.constants import CRITICAL_DEVICES, DAY, LAST_CALLS
 from gliderwatch.health.readings import History
-from gliderwatch.health.rule import Finding, Limit, Limits, Rule, found, loudest, run
+from gliderwatch.health.rule import Finding, Limit, Limits, Rule, above, below, found, loudest
 from gliderwatch.model import Severity
 
 _MEGA = 1e6
@@ -26,7 +26,7 @@ def _devices(history: History, limits: Limits) -> Finding | None:
         what = "a device" if device == "all" else f"device {device}"
         findings.append(found("devices", severity, t, f"a new error of {what}", history, name))
     most, burst = limits["warnings"], limits["oddities"]
-    many = None if most is None else run(history, "warnings:all", lambda v: v > most)
+    many = above(history, "warnings:all", most)
     if many is not None and most is not None:
         text = f"{many.v[-1]:.0f} warnings of devices in one segment, more than {most:.0f}"
         findings.append(found("devices", Severity.WARNING, float(many.t[0]), text, history, "warnings:all"))
@@ -53,7 +53,7 @@ def _growth(history: History, name: str, least: float) -> float | None:
 def _mission_time(history: History, limits: Limits) -> Finding | None:
     for which, severity in (("critical", Severity.CRITICAL), ("warning", Severity.WARNING)):
         limit = limits[which]
-        long = None if limit is None else run(history, "mission_time", lambda v, x=limit: v > x)  # type: ignore[misc]
+        long = above(history, "mission_time", limit)
         if long is not None and limit is not None:
             days = f"{long.v[-1] / DAY:.1f} days, more than {limit / DAY:.0f}"
             text = f"the mission runs for {days}; it may abort at 45"
@@ -63,7 +63,7 @@ def _mission_time(history: History, limits: Limits) -> Finding | None:
 
 def _fix(history: History, limits: Limits) -> Finding | None:
     limit = limits["minutes"]
-    old = None if limit is None else run(history, "fix_age", lambda v: v > limit)
+    old = above(history, "fix_age", limit)
     if old is None or limit is None:
         return None
     text = f"the fix is {old.v[-1] / 60:.0f} min old at a call, twice in a row above {limit / 60:.0f} min"
@@ -78,7 +78,7 @@ def _memory(history: History, limits: Limits) -> Finding | None:
         ("disk_free", "disk", Severity.WARNING),
     ):
         limit = limits[which]
-        low = None if limit is None else run(history, name, lambda v, x=limit: v < x)  # type: ignore[misc]
+        low = below(history, name, limit)
         if low is not None and limit is not None:
             scale, unit = (_KILO, "kB") if name == "heap_free" else (_MEGA, "MB")
             what = "memory" if name == "heap_free" else "disk"

@@ -22,7 +22,7 @@ from gliderwatch.health.constants import (
     USUAL,
 )
 from gliderwatch.health.readings import History
-from gliderwatch.health.rule import Finding, Limit, Limits, Rule, found, loudest, run
+from gliderwatch.health.rule import Finding, Limit, Limits, Rule, above, below, found, loudest, run
 from gliderwatch.model import Array, Series, Severity, readonly
 
 _WEEK = 7 * DAY
@@ -36,7 +36,7 @@ def _leak(history: History, limits: Limits) -> Finding | None:
         if len(usual) >= USUAL and (drop := limits["below_usual"]) is not None:
             tests.append((float(np.median(usual.v)) - drop, Severity.WARNING))
         for limit, severity in tests:
-            low = None if limit is None else run(history, name, lambda v, x=limit: v < x)  # type: ignore[misc]
+            low = below(history, name, limit)
             if low is not None:
                 text = f"leak detector at {low.v.min():.3f} V, twice in a row below {limit:.3f} V"
                 findings.append(found("leak", severity, float(low.t[0]), text, history, name))
@@ -66,10 +66,8 @@ def _vacuum(history: History, limits: Limits) -> Finding | None:
         (high, 1, Severity.WARNING),
     )
     for limit, side, severity in bounds:
-        if limit is None:
-            continue
-        bad = run(history, "vacuum", lambda v, x=limit, s=side: (v - x) * s > 0)  # type: ignore[misc]
-        if bad is not None:
+        bad = (below if side < 0 else above)(history, "vacuum", limit)
+        if bad is not None and limit is not None:
             word = "below" if side < 0 else "above"
             text = f"vacuum {bad.v[-1] / INHG:.2f} inHg, twice in a row {word} {limit / INHG:.2f} inHg"
             return found("vacuum", severity, float(bad.t[0]), text, history, "vacuum")

@@ -91,6 +91,16 @@ def run(
     return None
 
 
+def below(history: History, name: str, limit: float | None) -> Series | None:
+    """The same of two or more readings below a limit (None: it is not looked at)."""
+    return None if limit is None else run(history, name, lambda v: v < limit)
+
+
+def above(history: History, name: str, limit: float | None) -> Series | None:
+    """The same of two or more readings above a limit (None: it is not looked at)."""
+    return None if limit is None else run(history, name, lambda v: v > limit)
+
+
 def found(rule: str, severity: Severity, t: float, text: str, history: History, quantity: str) -> Finding:
     """A finding with the last readings of its quantity."""
     series = history.get(quantity)
