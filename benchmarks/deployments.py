@@ -15,8 +15,11 @@ import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
+from common import GLIDERWATCH
+
+from gliderwatch.simulate.scenario_files import load_scenario
+
 HERE = Path(__file__).parent / "deployments"
-COMMAND = Path(sys.executable).with_name("gliderwatch")
 
 
 def simulated(name: str, out: Path) -> Path:
@@ -25,7 +28,7 @@ def simulated(name: str, out: Path) -> Path:
     if not folder.exists():
         scenario = str(HERE / f"{name}.yml")
         subprocess.run(
-            [COMMAND, "simulate", folder, "--scenario", scenario, "--full-rate"],
+            [GLIDERWATCH, "simulate", folder, "--scenario", scenario, "--full-rate"],
             check=True,
             capture_output=True,
         )
@@ -34,8 +37,6 @@ def simulated(name: str, out: Path) -> Path:
 
 def onset(name: str) -> float:
     """When the fault of a deployment begins (s)."""
-    from gliderwatch.simulate.scenario_files import load_scenario  # noqa: PLC0415
-
     return load_scenario(HERE / f"{name}.yml").faults[0].onset
 
 
@@ -62,12 +63,11 @@ def main() -> None:
     options = parser.parse_args()
     names = options.only or sorted(path.stem for path in HERE.glob("*.yml"))
     folders = [simulated(name, options.out) for name in names]
-    done = subprocess.run(
-        [COMMAND, "hindcast", *folders, "--out", options.out / options.estimator.replace(":", "-"), "--json",
-         *(["--estimator", options.estimator] if options.estimator != "joint" else
-           ["--settings", HERE / "gliderwatch.json"])],
-        check=False, capture_output=True, text=True,
-    )  # fmt: skip
+    joint = options.estimator == "joint"
+    how = ["--settings", HERE / "gliderwatch.json"] if joint else ["--estimator", options.estimator]
+    out = options.out / options.estimator.replace(":", "-")
+    command = [GLIDERWATCH, "hindcast", *folders, "--out", out, "--json", *how]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
     print(done.stderr, file=sys.stderr)
     print(f"{'deployment':<14}{'event':>14}  {'by dbd':<34}{'by sbd':<34}")
     for line in done.stdout.splitlines():

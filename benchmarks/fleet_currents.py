@@ -37,6 +37,7 @@ from common import machine
 from gliderwatch.fleet.cross_check import Check, cross_check
 from gliderwatch.fleet.flow import DiveCurrent, fleet_flow
 from gliderwatch.model import Array, Fix
+from gliderwatch.navigation.geodesy import heading_vectors
 from gliderwatch.simulate.flight import Point, offset
 from gliderwatch.simulate.ocean import Ocean, make_ocean
 from gliderwatch.simulate.seas import SEAS, sea_mission
@@ -84,15 +85,15 @@ class Glider:
         """Fly one dive from a time (s since the start) on."""
         before, took = self.place.copy(), DIVE * (1 + self.rng.uniform(-0.08, 0.08))
         loss, turn = self.errors(t)
-        way = self.speed * (1 - loss) * _unit(self.heading - turn)
+        way = self.speed * (1 - loss) * heading_vectors(self.heading - turn)
         flow = np.zeros(2)
         for k in range(STEPS):
             here = (np.full(LEVELS, x) for x in (start + t + (k + 0.5) / STEPS * took, *self.place))
             u, v = ocean.current(*here, (np.arange(LEVELS) + 0.5) / LEVELS * depth)
             flow += np.array([u.mean(), v.mean()]) / STEPS
             self.place = self.place + (np.array([u.mean(), v.mean()]) + way) * took / STEPS
-        found = flow + way - self.speed * _unit(self.heading) + NOISE * self.rng.standard_normal(2)
-        course = _unit(self.heading)
+        found = flow + way - self.speed * heading_vectors(self.heading) + NOISE * self.rng.standard_normal(2)
+        course = heading_vectors(self.heading)
         made = DiveCurrent(
             f"g{self.k}",
             _fix(start + t, before, origin),
@@ -105,10 +106,6 @@ class Glider:
         if not self.job.one_way and np.hypot(*self.place) > ACROSS and self.place @ course > 0:
             self.heading = math.atan2(-self.place[0], -self.place[1]) + self.rng.uniform(-0.6, 0.6)
         return made
-
-
-def _unit(heading: float) -> Array:
-    return np.array([math.sin(heading), math.cos(heading)])
 
 
 def _fix(t: float, place: Array, origin: Point) -> Fix:

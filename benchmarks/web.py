@@ -11,18 +11,17 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import os
 import random
 import signal
 import statistics
 import subprocess
-import sys
 import tempfile
 import time
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import httpx
+from common import GLIDERWATCH
 from pages import state_of
 
 from gliderwatch.store.state_file import Status, Store
@@ -30,7 +29,6 @@ from gliderwatch.store.state_file import Status, Store
 PORT = 8499
 URL = f"http://127.0.0.1:{PORT}"
 SPEEDUP = 1800
-GLIDERWATCH = Path(sys.executable).with_name("gliderwatch")
 
 
 async def watched(pages: list[str], viewers: int, seconds: float) -> list[float]:
@@ -75,9 +73,7 @@ def taken_in(state: Path) -> int:
 def begin(stack: ExitStack, *words: str | Path) -> None:
     """Run a command until the stack is left."""
     quiet = subprocess.DEVNULL
-    process = subprocess.Popen(
-        [GLIDERWATCH, *words], stdout=quiet, stderr=quiet, start_new_session=True, env=dict(os.environ)
-    )
+    process = subprocess.Popen([GLIDERWATCH, *words], stdout=quiet, stderr=quiet, start_new_session=True)
 
     def end() -> None:
         process.send_signal(signal.SIGTERM)
