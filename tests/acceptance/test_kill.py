@@ -16,6 +16,7 @@ import pytest
 
 from acceptance.chaos import Chaos, Sent, differences, fleet
 from acceptance.support import (
+    GLIDERWATCH,
     TRACEBACK,
     Daemon,
     Mailbox,
@@ -34,6 +35,8 @@ from gliderwatch.slocum.header import read_header
 from gliderwatch.store.state_file import Status, Store
 
 KILLS = 5
+# Here the service is the installed program, from the start of Python on: one that is forked ready to run is
+# killed at other moments of its start.
 
 
 def simulated() -> list[Sent]:
@@ -87,9 +90,6 @@ def settled(site: Site, files: list[Sent]) -> bool:
     return all(name in ledger and ledger[name].size == size for name, size in sizes.items())
 
 
-OF_A_CHILD = '  File "<string>", line 1, in <module>'
-
-
 def check_mails(box: Mailbox, kills: list[float], site: Site) -> None:
     """Every message arrived; none twice, unless a kill fell between its acceptance and the note of it."""
     until(lambda: site.undelivered() == 0, "all delivered")
@@ -98,13 +98,12 @@ def check_mails(box: Mailbox, kills: list[float], site: Site) -> None:
     for id in twice:
         times = [mail.accepted for mail in box.mails if mail.id == id]
         for first, second in pairwise(times):
-            # The note of it waits for the transaction of a file, on a busy machine for more than a second.
-            assert any(first <= kill < second and kill - first < 5.0 for kill in kills), (id, times, kills)
+            assert any(first <= kill < second and kill - first < 1.0 for kill in kills), (id, times, kills)
 
 
 def check(site: Site, box: Mailbox, files: list[Sent], seed: int) -> None:
     """Feed and kill, then compare with one undisturbed replay of the same files."""
-    with Daemon(site) as daemon:
+    with Daemon(site, [GLIDERWATCH]) as daemon:
         kills = feed(site, daemon, files, seed)
         until(lambda: settled(site, files), "all files judged")
         check_mails(box, kills, site)
@@ -217,9 +216,7 @@ def test_logs_that_grow_and_a_kill_in_the_midst_of_them_end_as_a_replay_does(tmp
             until(lambda: {n: f.size for n, f in site.files().items()} == sizes, "all files judged", 180.0)
             until(lambda: site.undelivered() == 0, "all delivered")
             assert daemon.stop() == 0
-    # A worker that is just starting when its daemon is killed finds its pipe closed, and says so itself.
-    text = daemon.text().replace(f"{TRACEBACK} (most recent call last):\n{OF_A_CHILD}", "")
-    assert TRACEBACK not in text
+    assert TRACEBACK not in daemon.text()
     aborts = {mail.id for mail in box.mails if mail.subject == "cora ABORTED: leak"}
     assert len(aborts) == 1
     out = tmp_path / "out"
