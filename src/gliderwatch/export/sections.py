@@ -10,18 +10,11 @@ import numpy as np
 
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.export import netcdf
+from gliderwatch.export.properties import PROPERTIES
 from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.layers.section import Section
 from gliderwatch.messages.formatting import clean
 from gliderwatch.model import Array, Assessment
-
-_PROPERTIES = {
-    "temperature": ("degree_Celsius", "sea_water_temperature"),
-    "salinity": ("1", "sea_water_practical_salinity"),
-    "density": ("kg m-3", "sea_water_sigma_theta"),
-    "oxygen": ("umol l-1", "mole_concentration_of_dissolved_molecular_oxygen_in_sea_water"),
-}
-"""Unit and CF standard name of the properties that have layers; those of other sensors are not known."""
 
 
 def write(
@@ -90,7 +83,7 @@ def _coordinates(data: netCDF4.Dataset, name: str, found: Section, lat: Array, l
 
 
 def _property(data: netCDF4.Dataset, found: Section, sensor: str) -> None:
-    unit, standard = _PROPERTIES.get(sensor, ("1", ""))
+    unit, standard = PROPERTIES.get(sensor, ("1", ""))
     attributes = {"units": unit, "long_name": f"{sensor}, mean of the casts of a segment"}
     attributes |= {"standard_name": standard} if standard else {}
     netcdf.variable(data, clean(sensor), ("profile", "z"), found.value, attributes)
@@ -100,7 +93,7 @@ def _layers(data: netCDF4.Dataset, advice: Sequence[LayerAdvice]) -> None:
     """The layers of each profile, from the surface down."""
     most = max((len(one.layers) for one in advice if one.layers), default=1)
     data.createDimension("layer", most)
-    unit = f"{_PROPERTIES.get(advice[0].sensor, ('1', ''))[0]} m-1"
+    unit = f"{PROPERTIES.get(advice[0].sensor, ('1', ''))[0]} m-1"
     for field, units, words in (
         ("top", "m", "upper limit of the layer"),
         ("bottom", "m", "lower limit of the layer"),

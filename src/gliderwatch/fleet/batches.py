@@ -38,7 +38,7 @@ class Where:
 
 def params_of(sensor: Sensor, estimator: Estimator) -> FieldParams:
     """How a field of a sensor behaves, by `SENSORS_OF_FIELDS`."""
-    deviation, mean, spread, _ = SENSORS_OF_FIELDS[sensor]
+    deviation, mean, spread = SENSORS_OF_FIELDS[sensor]
     return FieldParams(estimator, deviation, mean, spread)
 
 

@@ -44,13 +44,13 @@ SAMPLE_STEP = 60.0
 """s: finer samples are averaged to one before they are kept: 6 to 16 m of depth, within a Gaussian's spread
 in a box of 100 m."""
 SENSORS_OF_FIELDS = {
-    "sci_water_temp": (1.0, 15.0, 10.0, "degree_Celsius"),
-    "salinity": (0.2, 33.0, 10.0, "1"),
-    "density": (0.3, 25.0, 10.0, "kg m-3"),
-    "oxygen": (15.0, 250.0, 100.0, "umol l-1"),
+    "sci_water_temp": (1.0, 15.0, 10.0),
+    "salinity": (0.2, 33.0, 10.0),
+    "density": (0.3, 25.0, 10.0),
+    "oxygen": (15.0, 250.0, 100.0),
 }
 """Of each sensor of a field: usual deviation from the mean profile, mean and spread of that before any
-sample, and the unit of all three. Upper ocean of middle latitudes; the spread holds the other seas."""
+sample, in °C, 1, kg/m³ and µmol/l. Upper ocean of middle latitudes; the spread holds the other seas."""
 
 # Relays
 LARGEST_PARCEL = 64 * 1024

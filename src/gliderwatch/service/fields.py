@@ -15,9 +15,10 @@ import numpy as np
 from gliderwatch import __version__
 from gliderwatch.config import Config
 from gliderwatch.errors import GliderwatchError
+from gliderwatch.export.properties import PROPERTIES
 from gliderwatch.fleet.advice import Advice, Bounds, Box, Leg, Point, Way, advise, with_planned
 from gliderwatch.fleet.batches import Sensor, batch_of, params_of, whereabouts
-from gliderwatch.fleet.constants import BIN, NO_MORE_AT_SEA, SENSORS_OF_FIELDS, USUAL_LEG
+from gliderwatch.fleet.constants import BIN, NO_MORE_AT_SEA, USUAL_LEG
 from gliderwatch.fleet.scalar_field import Batch, Checkpoint, FieldParams, at, estimate
 from gliderwatch.forecast.outlook import look_ahead
 from gliderwatch.model import Array, Segment, readonly
@@ -211,12 +212,6 @@ def _others(store: Store, glider: str, t: float) -> tuple[tuple[Point, ...], lis
 ACROSS, DOWN = 31, 21
 """Points of the file from side to side and from top to bottom: five between two Gaussians, and a top and a
 bottom."""
-_NAMES = {
-    "sci_water_temp": ("temperature", "sea_water_temperature"),
-    "salinity": ("salinity", "sea_water_practical_salinity"),
-    "density": ("density", "sea_water_sigma_theta"),
-    "oxygen": ("oxygen", "mole_concentration_of_dissolved_molecular_oxygen_in_sea_water"),
-}
 
 
 def write_field(store: Store, field: FleetField, path: Path, t: float | None = None) -> float:
@@ -273,8 +268,8 @@ def _fill(
         variable = file.createVariable(name, "f8", (name,))
         variable.setncatts(attributes)
         variable[:] = points
-    name, standard = _NAMES[field.sensor]
-    unit = SENSORS_OF_FIELDS[field.sensor][3]
+    name = "temperature" if field.sensor == "sci_water_temp" else field.sensor
+    unit, standard = PROPERTIES[name]
     shape = (1, *(len(axis) for axis in axes))
     for each, suffix, modifier in zip(values, ("", "_error"), ("", " standard_error"), strict=True):
         variable = file.createVariable(name + suffix, "f4", tuple(spaces), zlib=True)
