@@ -56,8 +56,12 @@ def phone() -> Iterator[Any]:
 
 
 def text_of(driver: Any) -> str:
-    """What the page says."""
-    return str(driver.find_element("tag name", "main").text)
+    """What the page says, once it stands still: a live page loads itself again when something was added."""
+    from selenium.common.exceptions import NoSuchElementException, StaleElementReferenceException
+
+    while True:
+        with suppress(NoSuchElementException, StaleElementReferenceException):
+            return str(driver.find_element("tag name", "main").text)
 
 
 def pressed(driver: Any, words: str) -> str:
