@@ -8,9 +8,11 @@ import re
 import stat
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from html import unescape
 from pathlib import Path
+from typing import TypeVar
 
 import jsonschema
 import pytest
@@ -27,11 +29,13 @@ from gliderwatch.messages.samples import SAMPLES
 from gliderwatch.model import Alert, Assessment, Incident, Kind, Segment, SegmentId
 from gliderwatch.pipeline import GliderState, Outcome
 from gliderwatch.store.state_file import Store
-from gliderwatch.web import app
+from gliderwatch.web import app, live
 from gliderwatch.web.cache import PageCache
+from gliderwatch.web.live import LivePage
 from unit.test_pages import HOSTILE, NOW, dive, incident
 
 NAMES = ("bruce", "electa")
+T = TypeVar("T")
 
 
 def keep(state: Path, glider: str, dives: tuple[Assessment, ...], incidents: tuple[Incident, ...]) -> None:
@@ -76,7 +80,10 @@ def client(config: Config) -> Iterator[TestClient]:
     def mute(glider: str, end: float, now: float) -> str:
         return "; ".join(mute_glider(config, glider, end, now))
 
-    with TestClient(app.application(config, take_on, mute), base_url="http://127.0.0.1:8463") as client:
+    async def draw(work: Callable[[live.LiveJob], T], job: live.LiveJob) -> T:
+        return work(job)  # the process is in the tests of the installed command
+
+    with TestClient(app.application(config, take_on, mute, draw), base_url="http://127.0.0.1:8463") as client:
         yield client
 
 
@@ -264,30 +271,64 @@ def test_news_come_when_the_state_has_changed(client: TestClient, config: Config
     assert "Bob has it" in client.get("/").text
 
 
+def test_a_page_that_the_browser_has_is_not_sent_again(client: TestClient) -> None:
+    plain = client.get("/electa.html", headers={"Accept-Encoding": "identity"})
+    packed = client.get("/electa.html", headers={"Accept-Encoding": "gzip"})
+    assert packed.headers["content-encoding"] == "gzip"
+    assert int(packed.headers["content-length"]) < len(plain.content) / 3
+    assert packed.text == plain.text
+    assert packed.headers["etag"] != plain.headers["etag"]
+    for answer, coding in ((plain, "identity"), (packed, "gzip")):
+        asked = {"Accept-Encoding": coding, "If-None-Match": answer.headers["etag"]}
+        again = client.get("/electa.html", headers=asked)
+        assert (again.status_code, again.content) == (304, b"")
+    assert client.get("/electa.html", headers={"If-None-Match": '"0"'}).status_code == 200
+
+
+def test_news_are_of_the_page_that_is_looked_at(client: TestClient, config: Config) -> None:
+    """What is new of electa has the page of bruce neither made anew nor loaded again; a browser that was away
+    gets its news when it comes back."""
+    before = {file: client.get(f"/{file}").headers["etag"] for file in ("electa.html", "bruce.html", "")}
+    address = re.search(r'data-live="([^"]+)"', client.get("/electa.html").text)
+    assert address is not None
+    acknowledge_incident(config, "electa/anomaly/1", "Bob", "", time.time())
+    with client.stream("GET", f"/{unescape(address[1])}") as stream:  # ends with the first news
+        assert "event: news" in "".join(stream.iter_text())
+    after = {file: client.get(f"/{file}").headers["etag"] for file in before}
+    assert [before[file] == after[file] for file in before] == [False, True, False]
+    with client.stream("GET", f"/{unescape(address[1])}") as stream:
+        assert "event: news" in "".join(stream.iter_text())
+
+
 def test_nobody_waits_for_a_page_that_is_there() -> None:
     made: list[str] = []
-    clock, stamp = [0.0], [((0, 0),)]
+    clock, mark = [0.0], [0]
 
-    def make(path: str) -> str:
-        if path == "none":
-            raise KeyError(path)
-        made.append(path)
-        return f"{path} {len(made)}"
+    async def make(file: str) -> LivePage:
+        if file == "none":
+            raise KeyError(file)
+        made.append(file)
+        await asyncio.sleep(0)
+        return LivePage(b"", b"", f"{file} {len(made)}")
 
-    cache = PageCache(make, lambda: stamp[0], lambda _path: 60.0, lambda: clock[0])
-    assert cache.get("a") == cache.get("a") == "a 1"
-    assert not cache.refresh()
-    stamp[0] = ((1, 1),)
-    assert cache.get("a") == "a 1"  # as it was a moment ago
-    assert cache.refresh()
-    assert cache.get("a") == "a 2"
-    clock[0] = 60.0
-    assert cache.refresh()
-    clock[0] = 700.0  # nobody has asked for ten minutes
-    assert not cache.refresh()
-    assert cache.get("a") == "a 4"
-    with pytest.raises(KeyError):
-        cache.get("none")
+    async def asked() -> None:
+        cache = PageCache(make, lambda _file: mark[0], lambda _file: 60.0, lambda: clock[0])
+        first = await asyncio.gather(*(cache.get("a") for _ in range(3)))  # made once for all
+        assert [page.version for page in first] == ["a 1"] * 3
+        assert not await cache.refresh()
+        mark[0] = 1
+        assert (await cache.get("a")).version == "a 1"  # as it was a moment ago
+        assert await cache.refresh()
+        assert (await cache.get("a")).version == "a 2"
+        clock[0] = 60.0
+        assert await cache.refresh()
+        clock[0] = 700.0  # nobody has asked for ten minutes
+        assert not await cache.refresh()
+        assert (await cache.get("a")).version == "a 4"
+        with pytest.raises(KeyError):
+            await cache.get("none")
+
+    asyncio.run(asked())
 
 
 # --------------------------------------------------------------------------- links in messages

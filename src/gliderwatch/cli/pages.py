@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import click
@@ -91,14 +90,17 @@ def web(config_path: Path, link: str | None, recipient: str | None) -> None:
 
         return "; ".join(mute_glider(config, glider, end, now))
 
-    sys.setswitchinterval(0.0005)  # who draws must not hold up who answers
     click.echo(f"http://{config.web.address}:{config.web.port}/", err=True)
-    uvicorn.run(
-        app.application(config, acknowledge, mute),
-        host=str(config.web.address),
-        port=config.web.port,
-        log_level="warning",
-        access_log=False,
-        server_header=False,
-        timeout_graceful_shutdown=3,
-    )
+    draw = app.InProcess(Path(config.state.path))
+    try:
+        uvicorn.run(
+            app.application(config, acknowledge, mute, draw),
+            host=str(config.web.address),
+            port=config.web.port,
+            log_level="warning",
+            access_log=False,
+            server_header=False,
+            timeout_graceful_shutdown=3,
+        )
+    finally:
+        draw.stop()

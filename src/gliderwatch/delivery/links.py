@@ -5,7 +5,6 @@ Those are signed for the incident and for who gets the message, and hold for a t
 
 from __future__ import annotations
 
-import os
 import re
 import secrets
 from dataclasses import dataclass, replace
@@ -42,8 +41,8 @@ def key_of(state: Path) -> str:
     path = state.with_name("web.key")
     try:
         if not path.exists():
-            part = path.with_name(f".web.key.{os.getpid()}")
-            part.touch(mode=0o600)
+            part = path.with_name(f".web.key.{secrets.token_hex(8)}")  # two threads must not share it
+            part.touch(mode=0o600, exist_ok=False)
             part.write_text(secrets.token_urlsafe(48), encoding="ascii")
             try:
                 path.hardlink_to(part)  # of two that make it at once the first is the one

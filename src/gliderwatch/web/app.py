@@ -5,18 +5,22 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Hashable
 from contextlib import asynccontextmanager, suppress
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Protocol, TypeVar
 from urllib.parse import parse_qs
 
+import structlog
+from pebble import ProcessExpired
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, JSONResponse, Response, StreamingResponse
+from starlette.responses import FileResponse, HTMLResponse, JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -25,40 +29,35 @@ from gliderwatch.delivery import links
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.export import maps
 from gliderwatch.export.dives import assessment_line
-from gliderwatch.figures.map_files import land_or_world
-from gliderwatch.health.rule import Limits
 from gliderwatch.messages.formatting import clean
 from gliderwatch.messages.guide import PAGE
 from gliderwatch.pages import render
-from gliderwatch.pages.guide import guide_page
-from gliderwatch.pages.reading import SHOWN, names_of, read_fleet, read_glider
+from gliderwatch.pages.reading import names_of, read_fleet
 from gliderwatch.pages.render import Frame
 from gliderwatch.pages.view import GliderView, worst_first
+from gliderwatch.service.drawing import DrawingProcess
 from gliderwatch.service.liveness import STALE, is_held, seconds_silent
 from gliderwatch.service.page_writer import battery_limits
 from gliderwatch.store.state_file import Store
-from gliderwatch.web import api
-from gliderwatch.web import explore as explorer
-from gliderwatch.web.cache import PageCache, stamp_of
+from gliderwatch.web import api, live
+from gliderwatch.web.cache import PageCache
+from gliderwatch.web.live import FLEET, LiveJob, LivePage, Shown, files_of, kept
+
+log = structlog.get_logger(__name__)
 
 Acknowledge = Callable[[str, str, float], str]
 """Takes an incident on: its id, who, when (s); the answer in a sentence. Raises GliderwatchError."""
 Mute = Callable[[str, float, float], str]
 """Mutes a glider until a time, at a time (s); the answer in a sentence. Raises GliderwatchError."""
-READERS = "who reads the pages"
-"""Whom the links on the pages are for: who reaches them is not known here."""
 MUTES = ("3", "6", "12", "24")
 """Hours for which a glider can be muted."""
-LIVE = "events"
-FLEET_KEPT, GLIDER_KEPT = 60.0, 300.0
-"""Seconds for which a page holds while the state file does not change."""
 LOOK = 1.0
-"""Seconds between two looks at whether it has."""
+"""Seconds between two looks at whether the state file has changed."""
 SIGN = 15.0
 """Seconds between two signs of life of a stream of news: proxies close silent ones."""
+LIMIT = 60.0
+"""Seconds that a page may take to be made: usually a tenth of one."""
 MOST = 10_000
-EXPLORED = 3000
-"""Dives of a glider, a year of them, that are explored at the most."""
 DRAWN = (
     "default-src 'none'; script-src 'self'; style-src 'unsafe-inline'; connect-src 'self'; "
     "img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -66,95 +65,136 @@ DRAWN = (
 """The policy of the plots to explore: Bokeh makes styles as it draws, and has its icons in them."""
 _FORM = 2000
 """Bytes of a form that is read."""
+_NICENESS = 10
+DOWN = "gliderwatch does NOT RUN: nothing new is seen, and nobody is alerted."
+T = TypeVar("T")
+
+
+BOKEH = "bokeh.min.js"
+"""The script that draws plots to explore, of Bokeh's own package."""
+
+
+def bokeh() -> Path:
+    """Where Bokeh's script is; the package itself is not loaded here."""
+    found = find_spec("bokeh")
+    assert found is not None and found.origin is not None  # it comes with the extra that has Starlette
+    return Path(found.origin).parent / "server" / "static" / "js" / BOKEH
+
+
+def stamp_of(state: Path) -> Hashable:
+    """What changes with every change of a state file: time and size of it and of its log."""
+    found = []
+    for path in (state, state.with_name(f"{state.name}-wal")):
+        with suppress(OSError):
+            status = path.stat()
+            found.append((path.suffix, status.st_mtime_ns, status.st_size))
+    return tuple(found)
+
+
+class Draw(Protocol):
+    """Has work done away from where requests are answered."""
+
+    async def __call__(self, work: Callable[[LiveJob], T], job: LiveJob) -> T:
+        """What the work makes. Raises what it raises, or GliderwatchError where it is not done in time."""
+
+
+class InProcess:
+    """Draws in a process of its own, which yields to others: who answers never waits for it."""
+
+    def __init__(self, state: Path) -> None:
+        self._state, self._process = state, DrawingProcess(_NICENESS)
+
+    async def __call__(self, work: Callable[[LiveJob], T], job: LiveJob) -> T:
+        """What the work makes. Raises what it raises, or GliderwatchError where it is not done in time."""
+        making = self._process.begin(work, job, LIMIT, self._state)
+        try:
+            if making is not None:
+                return await asyncio.wrap_future(making)
+        except (TimeoutError, ProcessExpired):
+            pass
+        raise GliderwatchError(f"the page {job.file} could not be made in {LIMIT:g} s")
+
+    def stop(self) -> None:
+        """End the process."""
+        self._process.stop()
 
 
 class Site:
     """What is shown of one state file."""
 
-    def __init__(self, config: Config, acknowledge: Acknowledge, mute: Mute) -> None:
-        self.config, self.acknowledge, self.mute = config, acknowledge, mute
+    def __init__(self, config: Config, acknowledge: Acknowledge, mute: Mute, draw: Draw) -> None:
+        self.config, self.acknowledge, self.mute, self.draw = config, acknowledge, mute, draw
         self.state = Path(config.state.path)
         self.key = links.key_of(self.state)
-        self.pages = PageCache(self._make, lambda: stamp_of(self.state), self._kept)
         self.news = asyncio.Condition()
+        self.pages = PageCache(self._make, self._mark, kept)
+        self._shown: Shown | None = None
+        self._marks: dict[str, Hashable] = {}
+        self._seen: Hashable = None
 
-    def _kept(self, path: str) -> float:
-        return FLEET_KEPT if path == "index.html" else GLIDER_KEPT
+    async def page(self, file: str) -> LivePage:
+        """A page. Raises KeyError where there is none of that name, GliderwatchError."""
+        await self.job(file)
+        if file not in self._marks:
+            raise KeyError(file)
+        return self.pages.held(file) or await self.pages.get(file)
 
-    def frame(self, path: str) -> Frame:
-        """When a page is made, when the next is due, and whether the service runs."""
-        now = time.time()
-        silent = seconds_silent(self.state)
-        is_alive = is_held(self.state) and silent is not None and silent < STALE
-        warning = "" if is_alive else "gliderwatch does NOT RUN: nothing new is seen, and nobody is alerted."
-        return Frame(now, now + 2 * self._kept(path) + 60.0, LIVE, warning)
+    async def job(self, file: str) -> LiveJob:
+        """What the page of a file is made from. Raises GliderwatchError."""
+        if self._shown is None:
+            await self.read()
+        assert self._shown is not None
+        return LiveJob(self._shown, file, self._warning())
 
-    def _make(self, path: str) -> str:
-        frame = self.frame(path)
-        if path == "index.html":
-            return render.fleet_page(self.fleet(frame.now), frame, land_or_world(self.config.maps.files)[0])
-        if path == PAGE:
-            return guide_page()
-        view = self._view(path, ("", "-sheet"), "html", frame.now)
-        if view is None:
-            raise KeyError(path)
-        land = land_or_world(self.config.maps.files)[0]
-        if path == render.file_of(view.name):
-            return render.glider_page(view, frame, land, self._take_on(view))
-        return render.sheet_page(view, frame, land)
-
-    def _view(
-        self, path: str, kinds: tuple[str, ...], ending: str, now: float, dives: int = SHOWN
-    ) -> GliderView | None:
-        """What is known of the glider of which a page is, one of these kinds; None where there is none."""
-        with Store.looking(self.state) as store:
-            name = self._named(store, path, kinds, ending)
-            if name is None:
-                return None
-            attention, battery = self.config.attention(name), self._battery(name)
-            return read_glider(store, name, attention, now, dives=dives, battery=battery)
-
-    def _named(self, store: Store, path: str, kinds: tuple[str, ...], ending: str) -> str | None:
-        """The glider of which a page is."""
-        for name in names_of(store, self.config.gliders):
-            if path in {render.file_of(name, kind, ending) for kind in kinds}:
-                return name
-        return None
-
-    def _take_on(self, view: GliderView) -> dict[str, str]:
-        """The links of a page by which what goes on can be taken on, and the glider muted: signed, so that no
-        other page can have a browser follow them."""
-        ids = {m.id: m.id for m in view.open_matters if m.can_be_taken_on}
-        ids[view.name] = f"{view.name}/mute"
-        return {what: f"ack/{links.token(self.key, identity, READERS)}" for what, identity in ids.items()}
-
-    def glider(self, path: str) -> str | None:
-        """The glider that a page explores; None where there is no such page."""
-        with Store.looking(self.state) as store:
-            return self._named(store, path, ("",), "html")
-
-    def explored(self, path: str) -> GliderView | None:
-        """All that is known of the glider of a page, to be explored; None where there is no such page."""
-        return self._view(path, ("",), "json", time.time(), EXPLORED)
-
-    def fleet(self, now: float, dives: int = 1) -> tuple[GliderView, ...]:
-        """All gliders as known at `now` (s), with so many dives of each."""
-        with Store.looking(self.state) as store:
-            names = names_of(store, self.config.gliders)
-            batteries = {name: self._battery(name) for name in names}
-            return read_fleet(store, names, self.config.attention, now, dives, batteries)
-
-    def _battery(self, name: str) -> Limits | None:
-        return battery_limits(self.config, name)
+    async def read(self) -> None:
+        """See what is new, by page. Raises GliderwatchError."""
+        seen = (stamp_of(self.state), self._warning())
+        if seen != self._seen:
+            self._shown, self._marks = await run_in_threadpool(self._read)
+            self._seen = seen
 
     async def look(self) -> None:
         """Have pages made anew when there is news, and tell who looks at them; for ever."""
         while True:
             await asyncio.sleep(LOOK)
-            with suppress(GliderwatchError):  # the state cannot be read now: what is there stays
-                if await run_in_threadpool(self.pages.refresh):
-                    async with self.news:
-                        self.news.notify_all()
+            try:
+                await self.read()
+                is_news = await self.pages.refresh()
+            except (GliderwatchError, KeyError) as error:  # what is there stays; it is tried again
+                log.warning("pages not made anew", reason=str(error))
+                continue
+            if is_news:
+                async with self.news:
+                    self.news.notify_all()
+
+    def fleet(self, now: float, dives: int = 1) -> tuple[GliderView, ...]:
+        """All gliders as known at `now` (s), with so many dives of each."""
+        with Store.looking(self.state) as store:
+            names = names_of(store, self.config.gliders)
+            batteries = {name: battery_limits(self.config, name) for name in names}
+            return read_fleet(store, names, self.config.attention, now, dives, batteries)
+
+    async def _make(self, file: str) -> LivePage:
+        return await self.draw(live.page, await self.job(file))
+
+    def _warning(self) -> str:
+        """What stands above all pages where the service does not run."""
+        silent = seconds_silent(self.state)
+        return "" if is_held(self.state) and silent is not None and silent < STALE else DOWN
+
+    def _mark(self, file: str) -> Hashable:
+        return (self._marks.get(file), self._warning())
+
+    def _read(self) -> tuple[Shown, dict[str, Hashable]]:
+        config, marks = self.config, dict[str, Hashable]()
+        with Store.looking(self.state) as store:
+            names = names_of(store, config.gliders)
+            for name in names:
+                marks |= dict.fromkeys(files_of(name), store.facts(name).newest())
+        attention = {name: config.attention(name) for name in names}
+        batteries = {name: battery_limits(config, name) for name in names}
+        shown = Shown(self.state, attention, batteries, config.maps.files, self.key)
+        return shown, marks | {FLEET: hash(tuple(marks.items())), PAGE: None}
 
 
 # ----------------------------------------
@@ -167,28 +207,40 @@ def _site(request: Request) -> Site:
 
 
 async def page(request: Request) -> Response:
-    """A page of the fleet or of a glider."""
-    path = request.path_params.get("file", "index.html")
-    pages = _site(request).pages
+    """A page of the fleet or of a glider; as it was packed for all, or nothing where the browser has it."""
     try:
-        text = pages.held(path) or await run_in_threadpool(pages.get, path)
+        found = await _site(request).page(request.path_params.get("file", FLEET))
     except KeyError:
         raise HTTPException(404, "There is no such page.") from None
-    return HTMLResponse(text, headers={"Cache-Control": "no-cache"})
+    is_packed = "gzip" in request.headers.get("accept-encoding", "")
+    tag = f'"{found.version}{"-gzip" if is_packed else ""}"'
+    headers = {"Cache-Control": "no-cache", "ETag": tag, "Vary": "Accept-Encoding"}
+    if tag in request.headers.get("if-none-match", ""):
+        return Response(status_code=304, headers=headers)
+    if is_packed:
+        headers["Content-Encoding"] = "gzip"
+    return HTMLResponse(found.packed if is_packed else found.plain, headers=headers)
 
 
 async def events(request: Request) -> Response:
-    """News, as they come (server-sent events): `news` whenever pages were made anew."""
+    """News, as they come (server-sent events): `news` whenever the page that is looked at was made anew."""
     site = _site(request)
+    file, since = (request.query_params.get(name, "") for name in ("page", "since"))
+
+    def is_newer() -> bool:
+        held = site.pages.held(file)
+        return held is not None and held.version != since
 
     async def stream() -> AsyncIterator[str]:
         yield "retry: 5000\n\n"
         while not await request.is_disconnected():
             try:
                 async with asyncio.timeout(SIGN), site.news:
-                    await site.news.wait()
+                    await site.news.wait_for(is_newer)
                 yield "event: news\ndata: \n\n"
+                return
             except TimeoutError:
+                site.pages.held(file)  # somebody still looks at it
                 yield ": well\n\n"
 
     return StreamingResponse(stream(), media_type="text/event-stream", headers={"Cache-Control": "no-cache"})
@@ -237,18 +289,17 @@ async def explore(request: Request) -> Response:
     path, site = request.path_params["file"], _site(request)
     if path == "explore.js":
         return Response(render.part(path), media_type="text/javascript")
-    with suppress(KeyError):
-        kept = {"Cache-Control": "max-age=86400"}
-        return Response(explorer.script(path), media_type="text/javascript", headers=kept)
-    if path.endswith(".json"):
-        view = await run_in_threadpool(site.explored, path)
-        if view is None:
-            raise HTTPException(404, "There is no such page.")
-        text = await run_in_threadpool(explorer.plots, view)
-        return Response(text, media_type="application/json", headers={"Cache-Control": "no-cache"})
-    name = await run_in_threadpool(site.glider, path)
-    if name is None:
-        raise HTTPException(404, "There is no such page.")
+    if path == BOKEH:
+        headers = {"Cache-Control": "max-age=86400"}
+        return FileResponse(bokeh(), media_type="text/javascript", headers=headers)
+    job = await site.job(path)
+    try:
+        if path.endswith(".json"):
+            text = await site.draw(live.explored, job)
+            return Response(text, media_type="application/json", headers={"Cache-Control": "no-cache"})
+        name = {render.file_of(name): name for name in job.shown.attention}[path]
+    except KeyError:
+        raise HTTPException(404, "There is no such page.") from None
     page = render.explore_page(name, render.href(render.file_of(name, ending="json")), time.time())
     return HTMLResponse(page, headers={"Cache-Control": "no-cache", "Content-Security-Policy": DRAWN})
 
@@ -256,7 +307,7 @@ async def explore(request: Request) -> Response:
 async def acknowledge(request: Request) -> Response:
     """GET: buttons, as scanners of mail open links. POST: takes the incident on, or mutes its glider."""
     site = _site(request)
-    frame = Frame(time.time(), time.time() + FLEET_KEPT)
+    frame = Frame(time.time(), time.time() + live.FLEET_KEPT)
     try:
         seconds = site.config.web.link_hours * 3600.0
         incident, recipient = links.opened(site.key, request.path_params["token"], seconds)
@@ -302,6 +353,7 @@ async def problem(_request: Request, error: Exception) -> Response:
     if isinstance(error, HTTPException):
         return JSONResponse({"error": error.detail}, status_code=error.status_code)
     if isinstance(error, GliderwatchError):
+        log.warning("not answered", reason=str(error))
         text = "The state cannot be read now; see gliderwatch status."
         return JSONResponse({"error": text}, status_code=503)
     return JSONResponse({"error": "A mistake in gliderwatch; its log says more."}, status_code=500)
@@ -341,12 +393,14 @@ class Headers:
         await self._app(scope, receive, sending)
 
 
-def application(config: Config, acknowledge_incident: Acknowledge, mute_glider: Mute) -> Starlette:
+def application(
+    config: Config, acknowledge_incident: Acknowledge, mute_glider: Mute, draw: Draw
+) -> Starlette:
     """The application for a configuration. Raises GliderwatchError where its key cannot be had."""
 
     @asynccontextmanager
     async def life(app: Starlette) -> AsyncIterator[None]:
-        app.state.site = Site(config, acknowledge_incident, mute_glider)
+        app.state.site = Site(config, acknowledge_incident, mute_glider, draw)
         looking = asyncio.create_task(app.state.site.look())
         yield
         looking.cancel()
@@ -354,7 +408,7 @@ def application(config: Config, acknowledge_incident: Acknowledge, mute_glider: 
     return Starlette(
         routes=[
             Route("/", page),
-            Route(f"/{LIVE}", events),
+            Route(f"/{live.LIVE}", events),
             Route("/api/gliders", gliders),
             Route("/api/gliders/{name}/assessments", assessments),
             Route("/api/incidents", incidents),

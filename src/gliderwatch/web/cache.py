@@ -1,89 +1,79 @@
-"""Pages that are made once for all who look at them, and anew when the state file has changed."""
+"""Pages that are made once for all who look at them, and anew when there is news of what they show."""
 
 from __future__ import annotations
 
-import threading
+import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Hashable
 from dataclasses import dataclass
-from pathlib import Path
 
-Stamp = tuple[tuple[int, int], ...]
+from gliderwatch.web.live import LivePage
+
 LOOKED_AT = 600.0
 """Seconds after which a page that nobody asked for is not made anew."""
 
 
 @dataclass(slots=True)
-class _Page:
-    text: str
-    stamp: Stamp
+class _Held:
+    page: LivePage
+    mark: Hashable
     made: float
     asked: float
 
 
-def stamp_of(state: Path) -> Stamp:
-    """What changes with every change of a state file: time and size of it and of its log."""
-    found = []
-    for path in (state, state.with_name(f"{state.name}-wal")):
-        try:
-            status = path.stat()
-            found.append((status.st_mtime_ns, status.st_size))
-        except OSError:
-            found.append((0, 0))
-    return tuple(found)
-
-
 class PageCache:
-    """Pages by their path; used by several threads. `make` is slow: nobody waits for it who can have the page
-    as it was a moment ago. `keep` are the seconds for which a page holds without any change."""
+    """Pages by the names of their files; used in one thread. `make` is slow: nobody waits for it who can have
+    the page as it was a moment ago. `mark` is another whenever there is news of what a page shows, `keep` are
+    the seconds for which it holds without."""
 
     def __init__(
         self,
-        make: Callable[[str], str],
-        stamp: Callable[[], Stamp],
+        make: Callable[[str], Awaitable[LivePage]],
+        mark: Callable[[str], Hashable],
         keep: Callable[[str], float],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._make, self._stamp, self._keep, self._clock = make, stamp, keep, clock
-        self._pages: dict[str, _Page] = {}
-        self._drawing = threading.Lock()
+        self._make, self._mark, self._keep, self._clock = make, mark, keep, clock
+        self._held: dict[str, _Held] = {}
+        self._making: dict[str, asyncio.Future[LivePage]] = {}
 
-    def held(self, path: str) -> str | None:
-        """A page that is there; None where it has to be made first. At once: for the thread that answers."""
-        page, now = self._pages.get(path), self._clock()
-        if page is None or now - page.made >= 2 * self._keep(path):
+    def held(self, file: str) -> LivePage | None:
+        """A page that is there; None where it has to be made first."""
+        held, now = self._held.get(file), self._clock()
+        if held is None or now - held.made >= 2 * self._keep(file):
             return None
-        page.asked = now
-        return page.text
+        held.asked = now
+        return held.page
 
-    def get(self, path: str) -> str:
-        """A page, made if need be. Raises what `make` raises, KeyError where there is no such page."""
-        before = self._pages.get(path)
-        if (text := self.held(path)) is not None:
-            return text
-        with self._drawing:
-            again = self._pages.get(path)
-            if again is not None and again is not before:
-                return again.text  # somebody else made it meanwhile
-            return self._anew(path, self._clock()).text
+    async def get(self, file: str) -> LivePage:
+        """A page, made if need be, once for all who wait for it. Raises what `make` raises."""
+        page = self.held(file)
+        if page is not None:
+            return page
+        making = self._making.get(file)
+        if making is None:
+            making = self._making[file] = asyncio.ensure_future(self._anew(file, self._clock()))
+            making.add_done_callback(lambda _: self._making.pop(file))
+        return await asyncio.shield(making)
 
-    def refresh(self) -> bool:
-        """Make those anew that somebody looks at and that are out of date; whether there were any."""
-        now, stamp = self._clock(), self._stamp()
-        for path in [path for path, page in self._pages.items() if now - page.asked > LOOKED_AT]:
-            del self._pages[path]
+    async def refresh(self) -> bool:
+        """Make those anew that somebody looks at and that are out of date; whether there were any. Raises
+        what `make` raises."""
+        now = self._clock()
+        for file in [file for file, held in self._held.items() if now - held.asked > LOOKED_AT]:
+            del self._held[file]
         late = [
-            path
-            for path, page in self._pages.items()
-            if page.stamp != stamp or now - page.made >= self._keep(path)
+            file
+            for file, held in self._held.items()
+            if held.mark != self._mark(file) or now - held.made >= self._keep(file)
         ]
-        for path in late:
-            with self._drawing:
-                self._anew(path, self._pages[path].asked)
+        for file in late:
+            await self._anew(file, self._held[file].asked)
         return bool(late)
 
-    def _anew(self, path: str, asked: float) -> _Page:
-        stamp = self._stamp()
-        page = _Page(self._make(path), stamp, self._clock(), asked)
-        self._pages[path] = page
+    async def _anew(self, file: str, asked: float) -> LivePage:
+        mark = self._mark(file)  # before it is made: news that come meanwhile have it made again
+        page = await self._make(file)
+        held = self._held.get(file)
+        self._held[file] = _Held(page, mark, self._clock(), asked if held is None else held.asked)
         return page

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from functools import cache
-from importlib.resources import files
 from textwrap import wrap
 from typing import Any
 
@@ -28,17 +26,8 @@ TARGET = "plots"
 """The element of the page that the plots are put in."""
 HEIGHT, WRAPPED = 280, 120
 """Of a plot in pixels; of the lines of its sentence in characters."""
-SCRIPTS = ("bokeh.min.js",)
 _DASHES = ("solid", "dashed", "dotted", "dotdash")
 _MARKS = (("triangle", COLOURS[1]), ("diamond", COLOURS[4]))
-
-
-@cache
-def script(name: str) -> bytes:
-    """A script of Bokeh's package. Raises KeyError for one that pages do not need."""
-    if name not in SCRIPTS:
-        raise KeyError(name)
-    return files("bokeh").joinpath("server", "static", "js", name).read_bytes()
 
 
 def plots(view: GliderView) -> str:

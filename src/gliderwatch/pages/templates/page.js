@@ -14,6 +14,9 @@
   setInterval(look, 20000);
   if (root.dataset.live) {
     var source = new EventSource(root.dataset.live);
-    source.addEventListener("news", function () { location.reload(); });
+    source.addEventListener("news", function () {  // a moment apart: not all who look ask at once
+      source.close();
+      setTimeout(function () { location.reload(); }, 1000 * Math.random());
+    });
   }
 })();
