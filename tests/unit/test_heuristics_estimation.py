@@ -416,8 +416,8 @@ class TestVerdict:
             state, _ = step(state, each, SpeedParams())
         assert state.rolled == hints
 
-    @pytest.mark.parametrize(("roll", "hint"), [(0.25, modes.ROLLED), (0.27, modes.LOST)])
-    def test_a_roll_of_15_degrees_is_a_lost_wing(self, roll, hint, monkeypatch):
+    @pytest.mark.parametrize(("roll", "hint"), [(0.18, modes.ROLLED), (0.2, modes.LOST)])
+    def test_a_roll_of_11_degrees_is_a_lost_wing(self, roll, hint, monkeypatch):
         hints, real = [], kalman.step
         monkeypatch.setattr(kalman, "step", lambda *a: (hints.append(a[4]), real(*a))[1])
         state = SpeedState()

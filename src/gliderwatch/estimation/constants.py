@@ -277,9 +277,9 @@ OWN_SURE = 0.15
 """Standard error of W on a dive, as part of it, up to which the dive tells what W is to what is reported."""
 ROLL_STEP = 0.12
 """rad: a step of the mean roll that speaks for a lost or bent wing. Healthy gliders roll within 0.05."""
-ROLL_LOST = 0.26
-"""rad, 15 degrees as in the rule of health: a step of the mean roll that nothing but a lost wing makes. On a
-healthy real mission a new trim made one of 0.18."""
+ROLL_LOST = 0.19
+"""rad, 11 degrees: a step of the mean roll that is taken for a lost or bent wing. USF-Gansett kept 11 to 15
+degrees after a shark had bent one (000, III.B.3). On a healthy real mission a new trim made one of 0.18."""
 ROLL_CONFIRMS = 0.67
 """Standard errors by which a speed must be below normal where the glider rolls otherwise for two dives:
 three to one."""
