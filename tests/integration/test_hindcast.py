@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from gliderwatch.archive import cluster, missions, report, summary
+from gliderwatch.archive import missions, report, summary
 from gliderwatch.archive.hindcast import Found, Hindcast, delays
 from gliderwatch.archive.missions import Mission
 from gliderwatch.errors import GliderwatchError
@@ -110,15 +110,6 @@ def test_folders_that_hold_no_mission_are_named(tmp_path: Path) -> None:
         missions.find([str(tmp_path / "none")])
     with pytest.raises(GliderwatchError, match="there is no estimator"):
         report.make_in(tmp_path, "best", None, Mission("x", str(tmp_path), "sim", False, True))
-
-
-def test_a_scheduler_that_does_not_answer_is_named(monkeypatch) -> None:
-    monkeypatch.setattr(cluster, "PATIENCE", "0.2s")
-    with (
-        pytest.raises(GliderwatchError, match="no Dask scheduler answers"),
-        cluster.client("tcp://127.0.0.1:9"),
-    ):
-        pass
 
 
 def test_delays_are_of_the_same_incident() -> None:

@@ -11,7 +11,6 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from gliderwatch import __version__
 from gliderwatch.archive.missions import Mission, is_full
 from gliderwatch.config import load
 from gliderwatch.errors import GliderwatchError
@@ -19,6 +18,7 @@ from gliderwatch.estimation.dive_measurement import observe
 from gliderwatch.model import Array, Assessment, Dive, Incident, SegmentId, readonly
 from gliderwatch.score.graft import navigate
 from gliderwatch.score.grid import configured, settings_of
+from gliderwatch.score.work import version
 from gliderwatch.sea.gauss_markov import FlowParams
 from gliderwatch.sea.smoother import Delayed, MeanCurrent, smooth
 from gliderwatch.service.replay import Request, caches_in, replay
@@ -260,9 +260,9 @@ def mean_currents(dives: Iterable[Dive]) -> list[MeanCurrent]:
 
 def fingerprint(mission: Mission, files: Iterable[Path], estimator: str, chosen: str) -> str:
     """A short hash of all that a hindcast rests on: files with their sizes, settings (`chosen` is the text of
-    a configuration), the version."""
+    a configuration), the sources."""
     listed = [f"{path.name} {path.stat().st_size}" for path in files]
-    parts = [__version__, repr(mission), estimator, chosen, *sorted(listed)]
+    parts = [version(), repr(mission), estimator, chosen, *sorted(listed)]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 

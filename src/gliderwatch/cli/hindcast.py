@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from gliderwatch.cli.options import FILE, example, progress
+from gliderwatch.cli.options import FILE, cluster_option, example, progress, workers_option
 from gliderwatch.errors import GliderwatchError
 
 
@@ -26,8 +26,8 @@ from gliderwatch.errors import GliderwatchError
     "--estimator", default="joint", help="joint, adaptive, or adaptive:PRESET of the papers (joint)."
 )
 @click.option("--settings", type=FILE, help="A configuration, for the settings of its gliders.")
-@click.option("--cluster", help="Address of a Dask scheduler; else a worker a core here.")
-@click.option("--workers", type=click.IntRange(1), help="Workers here (one a core).")
+@cluster_option
+@workers_option
 @click.option("--json", "as_json", is_flag=True, help="Results as JSON, a line a mission.")
 def hindcast(
     missions: tuple[str, ...],
@@ -60,7 +60,7 @@ def hindcast(
     found = archive.find(missions)
     out.mkdir(parents=True, exist_ok=True)
     done = list[judging.Hindcast]()
-    with dask_cluster.client(cluster, workers) as client, progress() as bar:
+    with progress() as bar:
         row = bar.add_task("missions", total=len(found))
 
         def on_done(_task: archive.Mission, result: judging.Hindcast) -> None:
@@ -70,7 +70,7 @@ def hindcast(
         work = partial(
             report.make_in, out.resolve(), estimator, None if settings is None else settings.resolve()
         )
-        failed = dask_cluster.run_all(work, found, client, on_done)
+        failed = dask_cluster.run_all(work, found, on_done, cluster, workers)
     summary.write(out, done)
     for one in sorted(done, key=lambda h: h.name):
         click.echo(msgspec.json.encode(one) if as_json else "\n".join((one.name, *report.lines(one), "")))

@@ -60,6 +60,8 @@ config_option = click.option(
     help="The YAML configuration.",
     show_default=True,
 )
+cluster_option = click.option("--cluster", help="Address of a Dask scheduler; else a worker a core here.")
+workers_option = click.option("--workers", type=click.IntRange(1), help="Workers here (one a core).")
 json_option = click.option("--json", "as_json", is_flag=True, help="For machines.")
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gliderwatch.cli.options import progress
+from gliderwatch.cli.options import cluster_option, example, progress, workers_option
 from gliderwatch.errors import GliderwatchError
 
 if TYPE_CHECKING:
@@ -78,7 +78,12 @@ def simulate(
     job.run(job.Job(out, scenarios, compressed, (speedup or 1.0) if live else None, rates, ill))
 
 
-@click.command(epilog="\b\nExample:\n  gliderwatch score --grid small --out score")
+@click.command(
+    epilog=example(
+        "gliderwatch score --grid small --out score",
+        "gliderwatch score --out score --cluster tcp://10.0.0.5:8786",
+    )
+)
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
@@ -96,10 +101,21 @@ def simulate(
     type=click.Path(exists=True, file_okay=False, path_type=Path),
     help="A folder with the files of a real, healthy mission: faults are grafted onto it.",
 )
-def score(out: Path, name: str, names: tuple[str, ...], missions: tuple[Path, ...]) -> None:
+@cluster_option
+@workers_option
+def score(
+    out: Path,
+    name: str,
+    names: tuple[str, ...],
+    missions: tuple[Path, ...],
+    cluster: str | None,
+    workers: int | None,
+) -> None:
     """Score the detection: simulated and real missions through the installed program.
 
-    OUT will hold score.json, score.html and, cell by cell, what they were made of.
+    OUT will hold score.json, score.html and, cell by cell, what they were made of. With the extra
+    gliderwatch[archive] all cores work on it, or the machines of a cluster, which must see OUT; without it
+    one glider flies after another.
     """
     from rich.console import Console
 
@@ -112,7 +128,7 @@ def score(out: Path, name: str, names: tuple[str, ...], missions: tuple[Path, ..
     if not cells:
         raise GliderwatchError(f"the grid {name} is empty: give it faults, healthy gliders, or a --mission")
     _writable(out)
-    failed = _run(work.to_do(cells, chosen, out))
+    failed = _run(work.to_do(cells, chosen, out.resolve()), cluster, workers)
     found = work.results(cells, chosen, out)
     if found:
         result = summary.summarise(found, version())
@@ -134,9 +150,10 @@ def _writable(out: Path) -> None:
         raise GliderwatchError(f"{out} cannot be written: {error.strerror}") from None
 
 
-def _run(tasks: Sequence[Task]) -> list[str]:
-    from gliderwatch.score.work import run_all
+def _run(tasks: Sequence[Task], address: str | None, workers: int | None) -> list[str]:
+    from gliderwatch.archive.cluster import run_all
+    from gliderwatch.score.work import work
 
     with progress() as bar:
-        task = bar.add_task("cells", total=len(tasks))
-        return run_all(tasks, lambda: bar.advance(task))
+        row = bar.add_task("cells", total=len(tasks))
+        return run_all(work, tasks, lambda _task, _result: bar.advance(row), address, workers)

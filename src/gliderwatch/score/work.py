@@ -1,17 +1,12 @@
-"""One glider through the real program (its files are made, replayed, and what came of it is kept), and all
-of them on all cores."""
+"""One glider through the real program: its files are made, replayed, and what came of it is kept."""
 
 from __future__ import annotations
 
 import hashlib
 import math
-import multiprocessing
 import os
-import signal
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -314,7 +309,7 @@ def _fed(segments: Iterable[Segment], config: Config) -> tuple[Store, tuple[Open
 
 
 # ----------------------------------------
-# All cells on all cores; what is done stays done.
+# What is still to do; what is done stays done.
 
 
 def to_do(cells: Iterable[Cell], estimators: Sequence[str], out: Path) -> list[Task]:
@@ -326,44 +321,6 @@ def to_do(cells: Iterable[Cell], estimators: Sequence[str], out: Path) -> list[T
         if missing:
             tasks.append(Task(cell, tuple(missing), tuple(missing.values())))
     return tasks
-
-
-def run_all(tasks: Sequence[Task], on_done: Callable[[], None]) -> list[str]:
-    """Run tasks in worker processes, as many as cores; what went wrong, in words.
-
-    Stopped from the keyboard, it leaves the results of what was done.
-    """
-    if not tasks:
-        return []
-    cores = len(os.sched_getaffinity(0))
-    context = multiprocessing.get_context("spawn")  # to fork a process with threads is unsafe
-    failed: dict[str, None] = {}  # of one mission all cells fail alike
-    with ProcessPoolExecutor(min(cores, len(tasks)), mp_context=context) as pool:
-        try:
-            with _deaf():  # to Ctrl-C, for good: it is this process that ends them, without a word of theirs
-                futures = [pool.submit(work, task) for task in tasks]
-            for future in as_completed(futures):
-                try:
-                    future.result()
-                except GliderwatchError as error:
-                    failed[str(error)] = None
-                on_done()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for worker in multiprocessing.active_children():
-                worker.terminate()
-            raise
-    return list(failed)
-
-
-@contextmanager
-def _deaf() -> Iterator[None]:
-    """Processes that begin inside do not hear Ctrl-C; this one hears it afterwards."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def results(cells: Iterable[Cell], estimators: Iterable[str], out: Path) -> list[Record]:
