@@ -46,5 +46,5 @@ def test_without_dask_this_process_does_it(monkeypatch) -> None:
 
 def test_a_scheduler_that_does_not_answer_is_named(monkeypatch) -> None:
     monkeypatch.setattr(cluster, "PATIENCE", "0.2s")
-    with pytest.raises(GliderwatchError, match="no Dask scheduler answers at tcp://127.0.0.1:9"):
+    with pytest.raises(GliderwatchError, match="no Dask scheduler answers"):
         cluster.run_all(squared, [1], lambda _task, _result: None, "tcp://127.0.0.1:9")
