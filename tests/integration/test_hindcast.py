@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import fsspec
@@ -23,11 +24,11 @@ DAY = 86400.0
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a mission of two days with both kinds of files, slowed down after a day."""
+    """The folder of a mission of a day and a half with both kinds of files, slowed down on the first day."""
     folder = tmp_path_factory.mktemp("archive") / "sim-2024"
-    scenario = Scenario(seed=3, days=2.0, interval=2 * 3600.0, full_rate=True)
-    faults = (Fault(FaultKind.REMORA, scenario.start + 1.2 * DAY, 8.0, 0.0),)
-    mission = simulate(Scenario(seed=3, days=2.0, interval=2 * 3600.0, full_rate=True, faults=faults))
+    scenario = Scenario(seed=3, days=1.4, interval=2 * 3600.0, full_rate=True)
+    faults = (Fault(FaultKind.REMORA, scenario.start + 0.8 * DAY, 8.0, 0.0),)
+    mission = simulate(replace(scenario, faults=faults))
     write_mission(folder / "sent", folder / "cache", mission)
     write_full_rate(folder / "recovered", mission)
     return folder
@@ -69,6 +70,20 @@ def test_the_report_is_a_page_a_paper_and_numbers(made: tuple[Path, Mission, Hin
         assert speed["through_water"].units == "m/s"
         assert np.isfinite(data["delayed_mode_east"]["current"][:]).all()
         assert len(data["track"]["surfacing_lat"]) > 10
+        assert np.ma.median(data["error_of_the_track"]["of_the_dive"][:]) < 150.0
+
+
+def test_what_was_measured_around_each_flag_is_shown(made: tuple[Path, Mission, Hindcast]) -> None:
+    out, _, found = made
+    assert found.full is not None
+    since = min(one.since for one in found.full.incidents)
+    with netCDF4.Dataset(out / report.NUMBERS) as data:
+        around = {name: data[name] for name in data.groups if "_around_" in name}
+        assert {name.partition("_")[0] for name in around} == {"roll", "pitch", "heading", "ballast", "depth"}
+        for group in around.values():
+            t = group["measured_time"][:]
+            assert since - 86400.0 <= t.min() < since < t.max()
+            assert len(t) > 1000
 
 
 def test_what_is_done_is_not_done_again(made: tuple[Path, Mission, Hindcast], monkeypatch) -> None:
@@ -85,10 +100,10 @@ def test_what_is_done_is_not_done_again(made: tuple[Path, Mission, Hindcast], mo
 
 def test_the_papers_law_shows_its_error_and_its_basis(place: Path, tmp_path: Path) -> None:
     (mission,) = missions.find([str(place / "sent")])
-    found = report.make_in(tmp_path, "adaptive:franklin", None, Mission("x", str(place), "sim", False, True))
+    found = report.make_in(tmp_path, "adaptive:franklin", None, mission)
     assert mission.full is False
     assert found.estimator == "adaptive:franklin"
-    with netCDF4.Dataset(tmp_path / "x" / report.NUMBERS) as data:
+    with netCDF4.Dataset(tmp_path / mission.name / report.NUMBERS) as data:
         assert len(data["clle"]["largest_of_the_dive"]) > 5
         assert len(data["track"]["basis_function_lat"]) >= 1
 

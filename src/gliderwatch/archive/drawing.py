@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,24 +12,65 @@ import numpy as np
 
 from gliderwatch import __version__
 from gliderwatch.archive.hindcast import Evidence
+from gliderwatch.archive.spells import Spell
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.export.netcdf import SINCE
 from gliderwatch.figures import dives, plots
 from gliderwatch.figures.plots import Line, Panel
+from gliderwatch.messages.formatting import utc
 from gliderwatch.model import Array, Assessment
 from gliderwatch.navigation.geodesy import displacement, from_plane
 
 TRACK = "Track"
 """Name of the figure that is no panel over time."""
+_RING = [(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * np.pi, 73)]
+"""A circle: a basis function is drawn by its width."""
 
 
 def panels(evidence: Evidence) -> list[Panel]:
-    """The panels over time: CLLE, speed and flow, what corroborates, currents in delayed mode."""
+    """The panels over time: how far the track is off, CLLE, speed and flow, what corroborates, currents in
+    delayed mode, what was measured around each flag."""
     some = evidence.best
-    made = [*_clle(some), *dives.panels(some)]
+    made = [_off(evidence), *_clle(some), *dives.panels(some)]
     if evidence.delayed is not None:
         made += _delayed(evidence)
-    return made
+    return [*made, *(panel for spell in evidence.spells for panel in _around(spell))]
+
+
+def _off(evidence: Evidence) -> Panel:
+    fixes, led = track(evidence)
+    t = np.array([d.t_surface for d in evidence.best if d.lat is not None and d.lon is not None])
+    off = np.array([np.hypot(*displacement(*a, *b)) for a, b in zip(led, fixes, strict=True)])
+    shows = (
+        "How far from each surfacing the estimated speed and flow would have led the glider, from the "
+        "surfacing before and on the course that it made."
+    )
+    return Panel("Error of the track", "error (m)", shows, (Line("of the dive", t, off),), zero=True)
+
+
+_UNITS = {
+    "roll": ("roll (degrees)", np.degrees(1.0)),
+    "pitch": ("pitch (degrees)", np.degrees(1.0)),
+    "heading": ("heading (degrees)", np.degrees(1.0)),
+    "ballast": ("volume (cm³)", 1e6),
+    "depth": ("depth (m)", 1.0),
+}
+
+
+def _around(spell: Spell) -> Iterator[Panel]:
+    """What was measured around a flag, a panel a quantity."""
+    flag = dives.FLAGS[spell.flag]
+    for name, series in spell.samples.items():
+        unit, factor = _UNITS[name]
+        shows = (
+            f"The {name} that the glider measured, from a day before to a day after the dive that began at "
+            f"{utc(spell.since)}, the first flagged: {flag}."
+        )
+        line = Line("measured", series.t, series.v * factor, joined=name != "heading")
+        at = np.array([spell.since])
+        mark = (flag, at, np.interp(at, line.t, line.v))
+        title = f"{name.capitalize()} around {utc(spell.since)}"
+        yield Panel(title, unit, shows, (line,), marked=(mark,), down=name == "depth")
 
 
 def _clle(some: Sequence[Assessment]) -> list[Panel]:
@@ -94,6 +135,9 @@ def track_figure(evidence: Evidence) -> Any:
     if len(evidence.centres):
         c = evidence.centres
         axis.plot(c[:, 1], c[:, 0], "o", color=plots.COLOURS[2], markersize=5, label="basis functions")
+        for centre in c:
+            ring = np.array([from_plane(evidence.width * np.array(way), *centre) for way in _RING])
+            axis.plot(ring[:, 1], ring[:, 0], ":", color=plots.COLOURS[2], linewidth=0.8)
     middle = float(np.mean(fixes[:, 0])) if len(fixes) else 0.0
     axis.set_aspect(1 / max(np.cos(np.radians(middle)), 0.1), adjustable="datalim")
     axis.set(xlabel="longitude (degrees)", ylabel="latitude (degrees)")
@@ -108,6 +152,7 @@ def write_numbers(path: Path, evidence: Evidence, made: Sequence[Panel]) -> None
             data.setncatts({"Conventions": "CF-1.8", "source": f"gliderwatch {__version__}"})
             fixes, led = track(evidence)
             group = data.createGroup("track")
+            group.setncatts({"basis_function_width": evidence.width, "basis_function_width_units": "m"})
             for name, values in (
                 ("surfacing", fixes),
                 ("estimate", led),

@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 
 from gliderwatch.archive.missions import Mission, is_full
+from gliderwatch.archive.spells import Spell, spells
 from gliderwatch.config import load
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.estimation.dive_measurement import observe
@@ -94,13 +95,16 @@ class Hindcast:
 @dataclass(frozen=True, slots=True)
 class Evidence:
     """What a report draws: assessments by each kind of files, the currents in delayed mode, the dives' own,
-    and the places (degrees, (n, 2)) of the basis functions of the papers' law."""
+    the places (degrees, (n, 2)) of the basis functions of the papers' law with their ``width`` (m), and what
+    was measured around the flags."""
 
     online: tuple[Assessment, ...]
     full: tuple[Assessment, ...]
     delayed: Delayed | None
     measured: tuple[MeanCurrent, ...]
     centres: Array
+    width: float
+    spells: tuple[Spell, ...]
 
     @property
     def best(self) -> tuple[Assessment, ...]:
@@ -111,12 +115,15 @@ class Evidence:
 @dataclass(frozen=True, slots=True)
 class Replays:
     """What the replays of a mission left: by kind of files (`online`, `full`) the assessments and what they
-    come to, the currents of its dives, the places of the basis functions (degrees, (n, 2)), the estimator."""
+    come to, the currents of its dives, the places of the basis functions (degrees, (n, 2)) and their width
+    (m), what was measured around the flags by the fullest files, the estimator."""
 
     assessed: dict[str, tuple[Assessment, ...]]
     judged: dict[str, Judged]
     measured: list[MeanCurrent]
     centres: Array
+    width: float
+    spells: tuple[Spell, ...]
     estimator: str
 
 
@@ -130,7 +137,7 @@ def replays(
     """
     assessed: dict[str, tuple[Assessment, ...]] = {"online": (), "full": ()}
     judged = dict[str, Judged]()
-    measured, centres = list[MeanCurrent](), readonly(np.empty((0, 2)))
+    measured, centres, around = list[MeanCurrent](), readonly(np.empty((0, 2))), tuple[Spell, ...]()
     config = configured(mission.glider, settings_of(estimator)) if settings is None else load(settings)
     caches = sorted({path.parent for path in folder.rglob("*") if is_cache(path.name)})
     caches += caches_in(folder.resolve().parent)
@@ -145,9 +152,11 @@ def replays(
         measured = mean_currents(navigate(segments)) or measured
         newest, _ = store.segments.resume(SegmentId(float("inf"), mission.glider, ""))
         centres = newest.memory.estimate.learner.centres
+        around = spells(assessed[kind], store.segments)
         store.close()
-    used = estimator if settings is None else config.glider(mission.glider).estimator
-    return Replays(assessed, judged, measured, centres, used)
+    params = config.glider(mission.glider)
+    used = estimator if settings is None else params.estimator
+    return Replays(assessed, judged, measured, centres, params.learner.sigma, around, used)
 
 
 def hindcast(mission: Mission, made: Replays) -> tuple[Hindcast, Evidence]:
@@ -170,7 +179,8 @@ def hindcast(mission: Mission, made: Replays) -> tuple[Hindcast, Evidence]:
         None if delayed is None else float(np.median(delayed.near_real_time.sigma)),
         None if delayed is None else float(np.median(delayed.delayed.sigma)),
     )
-    return found, Evidence(assessed["online"], assessed["full"], delayed, tuple(measured), made.centres)
+    online, full = assessed["online"], assessed["full"]
+    return found, Evidence(online, full, delayed, tuple(measured), made.centres, made.width, made.spells)
 
 
 def judge(dives: Sequence[Assessment], incidents: Iterable[Incident]) -> Judged:

@@ -1,0 +1,94 @@
+"""Spells of flagged dives, and what the glider measured around them: the ground truth of paper 000 (Figs. 3,
+8, 17)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gliderwatch.model import Assessment, Flag, Segment, Series, readonly
+from gliderwatch.store.segments import Segments
+
+DAY = 86400.0
+BESIDE = DAY
+"""s: so much is shown before the first flag of a spell, and after it; flags that are nearer are one spell."""
+MOST = 8
+"""Spells of a mission that are shown: a glider that is flagged more often is shown whole by other figures."""
+BINS = 1000
+"""Parts of a spell, of each of which the least and the greatest value is drawn: a strike lasts a minute."""
+QUANTITIES = {
+    "roll": ("roll",),
+    "pitch": ("pitch",),
+    "heading": ("heading",),
+    "ballast": ("ballast", "oil_volume"),
+    "depth": ("depth",),
+}
+"""What is shown, and the quantities of a segment that it is: of several the one with most samples."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spell:
+    """Dives with a ``flag`` in a row, ``since`` (s) the first one began; ``samples`` (SI) by the names of
+    `QUANTITIES`, as the glider measured them from a day before to a day after."""
+
+    since: float
+    flag: Flag
+    samples: Mapping[str, Series]
+
+
+def spells(dives: Sequence[Assessment], held: Segments) -> tuple[Spell, ...]:
+    """The spells of a mission with what the segments of its glider hold around each."""
+    return tuple(_spell(first, held) for first in first_dives(dives))
+
+
+def first_dives(dives: Sequence[Assessment]) -> list[Assessment]:
+    """The first dive of each spell of flags, `MOST` at the most."""
+    out, last = list[Assessment](), -np.inf
+    for dive in dives:
+        if dive.flag in (Flag.ANOMALY, Flag.FALSE_ALARM):
+            if dive.t_dive - last > BESIDE:
+                out.append(dive)
+            last = dive.t_dive
+    return out[:MOST]
+
+
+def _spell(first: Assessment, held: Segments) -> Spell:
+    start, end = first.t_dive - BESIDE, first.t_dive + BESIDE
+    ids = held.of(first.glider)
+    ends = [*(one.opened_at for one in ids[1:]), np.inf]
+    near = [one for one, until in zip(ids, ends, strict=True) if until > start and one.opened_at < end]
+    segments = [held.get(one) for one in near]
+    found = {name: _most(segments, names).between(start, end) for name, names in QUANTITIES.items()}
+    return Spell(
+        first.t_dive,
+        Flag(first.flag or 0),
+        {name: thinned(each) for name, each in found.items() if len(each)},
+    )
+
+
+def _most(segments: Sequence[Segment], names: Sequence[str]) -> Series:
+    """Of some quantities the samples, in order of time, of the one with most."""
+    found = [[segment.get(name) for segment in segments] for name in names]
+    most = max(found, key=lambda each: sum(map(len, each)))
+    t, v = (np.concatenate([getattr(series, of) for series in most]) for of in ("t", "v"))
+    order = np.argsort(t, kind="stable")
+    return Series(readonly(t[order]), readonly(v[order]))
+
+
+def thinned(series: Series) -> Series:
+    """Of each of `BINS` parts of the time at most the least and the greatest sample.
+
+    >>> t = np.arange(100_000.0)
+    >>> made = thinned(Series(t, np.where(t == 5000.0, 1.0, 0.0)))
+    >>> len(made) <= 2 * BINS, float(made.v.max())
+    (True, 1.0)
+    """
+    t, v = series.t, series.v
+    if len(t) <= 2 * BINS:
+        return series
+    edges = np.searchsorted(t, np.linspace(t[0], t[-1], BINS + 1)[1:-1])
+    parts = [part for part in np.split(np.arange(len(t)), edges) if len(part)]
+    kept = sorted({int(part[f(v[part])]) for part in parts for f in (np.argmin, np.argmax)})
+    return Series(readonly(t[kept]), readonly(v[kept]))
