@@ -84,7 +84,8 @@ DR_UNDERWATER, DR_AWAITING_FIX, DR_AWAITING_POSTFIX, DR_AWAITING_DIVE = 1, 2, 3,
 """Values of x_dr_state."""
 
 _ROLL_NOISE = 0.02
-_STRIKE = 0.7
+_STRIKE = (0.82, 0.94, 0.9)
+"""rad: roll, pitch, half the swing of heading while a shark holds on: 47, 54, over 100 degrees (000)."""
 _RANGE = 90.0
 _AMPERES, _VOLTS, _CAPACITY = 0.25, 15.0, 550.0
 _INCHES = 0.9
@@ -141,17 +142,17 @@ def _round_the_circle(angle: Array) -> Array:
 def _log_attitude(glider: Glider, cycles: Cycles, motion: Motion, reckoning: Reckoning) -> None:
     log, n, t = glider.log, len(cycles), glider.times(cycles)
     roll = _ROLL_NOISE * glider.rng.standard_normal(n) + glider.health.roll(t)
-    pitch = reckoning.pitch
+    pitch, heading = reckoning.pitch, reckoning.compass
     struck = glider.health.struck(t)
     if struck.any():
         to_and_fro = np.where(cycles % 2, 1.0, -1.0)
-        shaken = _STRIKE * struck * to_and_fro * glider.luck.uniform(0.5, 1, (2, n))
-        roll, pitch = roll + 1.5 * shaken[0], pitch + shaken[1]
+        shaken = np.outer(_STRIKE, struck * to_and_fro) * glider.luck.uniform(0.5, 1, (3, n))
+        roll, pitch, heading = roll + shaken[0], pitch + shaken[1], heading + shaken[2]
     log.add("m_depth", cycles, reckoning.depth)
     log.add("m_depth_rate", cycles, np.gradient(reckoning.depth, CYCLE))
     log.add("m_pitch", cycles, pitch)
     log.add("m_roll", cycles, roll)
-    log.add("m_heading", cycles, _round_the_circle(reckoning.compass))
+    log.add("m_heading", cycles, _round_the_circle(heading))
     log.add("m_speed", cycles, reckoning.speed)
     log.add("m_avg_speed", cycles, np.cumsum(reckoning.speed) / np.arange(1, n + 1))
     log.add("m_battpos", cycles, -_INCHES * motion.pitch + 0.01 * glider.luck.standard_normal(n))

@@ -19,8 +19,8 @@ from gliderwatch.simulate.telemetry import CADENCE, CYCLE, SCIENCE_CYCLE, Segmen
 # ----------------------------------------
 # What goes wrong with a glider, or only seems to: onset, growth and size of each fault.
 
-STRIKE = 40.0
-"""How long a shark holds on (s)."""
+STRIKE = 240.0
+"""s: how long a shark holds on: from 22:32 to 22:36 (000, USF-Gansett)."""
 
 
 class FaultKind(StrEnum):
