@@ -97,6 +97,17 @@ def test_how_restless_a_sea_is_is_learnt(size: float, scale: float) -> None:
     assert smooth(wild, SMALL, HOUR * 3).scale == scale
 
 
+@pytest.mark.parametrize(("tide", "factor"), [(0.0, 0.03), (0.035, 0.1), (0.1, 0.3), (0.4, 1.0)])
+def test_how_strong_the_tides_are_is_learnt(tide: float, factor: float) -> None:
+    chance, out = np.random.default_rng(3), list[MeanCurrent]()
+    for start in 1.7e9 + 200 * 60 * np.arange(40):
+        t = np.linspace(start, start + 3 * HOUR, 50)
+        mean = tide * np.stack([np.cos(M2 * t), np.sin(M2 * t)], -1).mean(axis=0)
+        seen = readonly(mean + chance.normal(0.0, 0.01, 2))
+        out.append(MeanCurrent(float(start), float(start + 3 * HOUR), seen, 0.01, 54.0))
+    assert smooth(out, SMALL, HOUR * 3).tides == factor
+
+
 def test_what_it_cannot_take_is_refused() -> None:
     with pytest.raises(ValueError, match="no dive"):
         smooth([], SMALL)

@@ -98,3 +98,6 @@ START_SIGMA = 1.0
 """m: error of the displacement where a dive begins, that of two fixes after each other."""
 SEA_SCALES = (0.1, 0.3, 1.0, 3.0, 10.0)
 """Factors on the noise of what is no tide, of which the one is taken that fits the mission best."""
+TIDE_SCALES = (0.03, 0.1, 0.3, 1.0)
+"""Factors on the prior sizes of the tides, taken likewise: on long dives a tide that is not there would
+explain a front (`benchmarks/delayed.py --seas front`: 7.8 cm/s delayed at 1 alone)."""

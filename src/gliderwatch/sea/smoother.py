@@ -17,7 +17,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -25,7 +26,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from gliderwatch.model import Array, readonly
-from gliderwatch.sea.constants import KNOT, SEA_SCALES, START_SIGMA
+from gliderwatch.sea.constants import KNOT, SEA_SCALES, START_SIGMA, TIDE_SCALES
 from gliderwatch.sea.gauss_markov import FIXED, FlowParams, intensities, passage, prior
 
 _ROUNDING = 1e-12
@@ -63,13 +64,14 @@ class Currents:
 @dataclass(frozen=True, slots=True)
 class Delayed:
     """What a mission that is over shows of its currents: in ``delayed`` mode, and at the same moments in
-    ``near_real_time`` and as ``foreseen``; ``scale`` is the factor on the noise of what is no tide that fits
-    it best."""
+    ``near_real_time`` and as ``foreseen``; ``scale`` and ``tides`` are the factors on the noise of what is no
+    tide and on the prior sizes of the tides that fit it best."""
 
     delayed: Currents
     near_real_time: Currents
     foreseen: Currents
     scale: float
+    tides: float
 
 
 class _Step(NamedTuple):
@@ -93,14 +95,31 @@ def smooth(dives: Sequence[MeanCurrent], params: FlowParams, knot: float = KNOT)
         raise ValueError("there is no dive with a current: nothing can be smoothed")
     if any(b.start < a.end - 1.0 for a, b in pairwise(dives)):
         raise ValueError("dives overlap: give those of one glider, each once, in order of time")
-    scale = max(SEA_SCALES, key=lambda one: _forward(dives, params, one, math.inf)[1])
+    scale, tides = _fitted(dives, params)
+    params = _with_tides(params, tides)
     steps, _ = _forward(dives, params, scale, knot)
     until_end = [state for part in _by_dive(steps) for state in _backward(part)]
     before = [(one.predicted, one.predicted_cov) for one in steps]
     delayed, near_real_time, foreseen = (
         _currents(steps, states, params) for states in (_backward(steps), until_end, before)
     )
-    return Delayed(delayed, near_real_time, foreseen, scale)
+    return Delayed(delayed, near_real_time, foreseen, scale, tides)
+
+
+def _fitted(dives: Sequence[MeanCurrent], params: FlowParams) -> tuple[float, float]:
+    """The likeliest of `SEA_SCALES` and of `TIDE_SCALES`: each in turn, the first once more at the end."""
+
+    @cache
+    def fit(scale: float, tides: float) -> float:
+        return _forward(dives, _with_tides(params, tides), scale, math.inf)[1]
+
+    scale = max(SEA_SCALES, key=lambda one: fit(one, TIDE_SCALES[-1]))
+    tides = max(TIDE_SCALES, key=lambda one: fit(scale, one))
+    return max(SEA_SCALES, key=lambda one: fit(one, tides)), tides
+
+
+def _with_tides(params: FlowParams, factor: float) -> FlowParams:
+    return replace(params, tides=tuple(replace(each, size=factor * each.size) for each in params.tides))
 
 
 def _forward(
