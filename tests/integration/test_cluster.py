@@ -27,6 +27,7 @@ def dies_once(mark: Path, n: int) -> int:
     return squared(n)
 
 
+@pytest.mark.slow  # two starts of a process that imports all
 def test_a_worker_that_dies_loses_nothing(tmp_path: Path) -> None:
     done: dict[int, int] = {}
     failed = cluster.run_all(partial(dies_once, tmp_path / "died"), range(6), done.__setitem__, workers=1)

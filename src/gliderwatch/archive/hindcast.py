@@ -22,7 +22,7 @@ from gliderwatch.score.grid import configured, settings_of
 from gliderwatch.score.work import version
 from gliderwatch.sea.gauss_markov import FlowParams
 from gliderwatch.sea.smoother import Delayed, MeanCurrent, smooth
-from gliderwatch.service.replay import Request, caches_in, replay
+from gliderwatch.service.replay import Request, cache_folders, caches_in, replay
 from gliderwatch.slocum.folders import is_cache
 
 MONTH = 30 * 86400.0
@@ -145,14 +145,15 @@ def replays(
         chosen = tuple(path for path in files if is_full(path) is wanted)
         if not chosen:
             continue
-        store = replay(Request(chosen, tuple(caches), config, mission.glider, out / kind)).store
+        request = Request(chosen, tuple(caches), config, mission.glider, out / kind)
+        store = replay(request).store
         assessed[kind] = tuple(store.assessments(mission.glider))
         judged[kind] = judge(assessed[kind], store.incidents(mission.glider))
         segments = (store.segments.get(identity) for identity in store.segments.of(mission.glider))
         measured = mean_currents(navigate(segments)) or measured
         newest, _ = store.segments.resume(SegmentId(float("inf"), mission.glider, ""))
         centres = newest.memory.estimate.learner.centres
-        around = spells(assessed[kind], store.segments)
+        around = spells(assessed[kind], chosen, cache_folders(request))
         store.close()
     params = config.glider(mission.glider)
     used = estimator if settings is None else params.estimator

@@ -3,13 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from gliderwatch.errors import GliderwatchError
 from gliderwatch.model import Assessment, Flag, Segment, Series, readonly
-from gliderwatch.store.segments import Segments
+from gliderwatch.slocum.decode import Decoder
+from gliderwatch.slocum.header import read_header
 
 DAY = 86400.0
 BESIDE = DAY
@@ -38,9 +42,26 @@ class Spell:
     samples: Mapping[str, Series]
 
 
-def spells(dives: Sequence[Assessment], held: Segments) -> tuple[Spell, ...]:
-    """The spells of a mission with what the segments of its glider hold around each."""
-    return tuple(_spell(first, held) for first in first_dives(dives))
+def spells(dives: Sequence[Assessment], files: Iterable[Path], caches: Sequence[Path]) -> tuple[Spell, ...]:
+    """The spells of a mission with what its `files` hold around each, whose lists are in `caches`.
+
+    They are read again, as what was judged keeps a sample in half a minute.
+    """
+    firsts = first_dives(dives)
+    if not firsts:
+        return ()
+    opened = sorted(_opened(files, firsts[0].glider))
+    with Decoder(caches) as decoder:
+        return tuple(_spell(first, opened, decoder) for first in firsts)
+
+
+def _opened(files: Iterable[Path], glider: str) -> Iterator[tuple[float, Path]]:
+    """The files of a glider, each with the time (s) at which it was opened."""
+    for path in files:
+        with suppress(GliderwatchError):  # named by the replay, which says what is wrong with it
+            header = read_header(path)
+            if header.id.glider == glider:
+                yield header.id.opened_at, path
 
 
 def first_dives(dives: Sequence[Assessment]) -> list[Assessment]:
@@ -54,12 +75,11 @@ def first_dives(dives: Sequence[Assessment]) -> list[Assessment]:
     return out[:MOST]
 
 
-def _spell(first: Assessment, held: Segments) -> Spell:
+def _spell(first: Assessment, opened: Sequence[tuple[float, Path]], decoder: Decoder) -> Spell:
     start, end = first.t_dive - BESIDE, first.t_dive + BESIDE
-    ids = held.of(first.glider)
-    ends = [*(one.opened_at for one in ids[1:]), np.inf]
-    near = [one for one, until in zip(ids, ends, strict=True) if until > start and one.opened_at < end]
-    segments = [held.get(one) for one in near]
+    ends = [*(t for t, _ in opened[1:]), np.inf]
+    near = [path for (t, path), until in zip(opened, ends, strict=True) if until > start and t < end]
+    segments = [found for _, found in decoder.map(near) if isinstance(found, Segment)]
     found = {name: _most(segments, names).between(start, end) for name, names in QUANTITIES.items()}
     return Spell(
         first.t_dive,
@@ -72,7 +92,7 @@ def _most(segments: Sequence[Segment], names: Sequence[str]) -> Series:
     """Of some quantities the samples, in order of time, of the one with most."""
     found = [[segment.get(name) for segment in segments] for name in names]
     most = max(found, key=lambda each: sum(map(len, each)))
-    t, v = (np.concatenate([getattr(series, of) for series in most]) for of in ("t", "v"))
+    t, v = (np.concatenate([np.empty(0), *(getattr(each, of) for each in most)]) for of in ("t", "v"))
     order = np.argsort(t, kind="stable")
     return Series(readonly(t[order]), readonly(v[order]))
 
