@@ -120,8 +120,20 @@ def test_no_such_field_and_no_samples_are_said(site: Path) -> None:
     assert "no samples for the field upper" in early.stderr
 
 
-def test_the_page_of_a_glider_says_where_to_look(site: Path) -> None:
+def test_pages_show_the_field_how_well_it_is_known_and_where_to_look(site: Path) -> None:
     done = command("pages", "--state", "results/replay.sqlite", "--out", "pages", cwd=site)
     assert done.returncode == 0, done.stderr
     text = (site / "pages" / "unit_0.html").read_text()
     assert re.search(r"Look next.{0,200}for upper: heading \d+°", text, re.S)
+    assert 'href="field.upper.html">upper</a>' in text
+    assert 'href="field.upper.html">upper</a>' in (site / "pages" / "index.html").read_text()
+    page = site / "pages" / "field.upper.html"
+    text = page.read_text()
+    assert page.stat().st_size < 150_000
+    assert "4 gliders in it now" in text
+    assert text.count('<svg class="field"') == 4  # map and section, of values and of errors
+    assert text.count('<circle class="next"') >= 2 * 2  # on both maps: what is advised
+    numbers = re.search(r"to place: (\S+) to (\S+) °C.*to (\S+) °C at best, to (\S+) in", text, re.S)
+    assert numbers is not None
+    low, high, best, worst = map(float, numbers.groups())
+    assert 10 < low < high < 30 and 0 < best < worst < 5

@@ -18,14 +18,15 @@ from jinja2.runtime import Context
 from markupsafe import Markup
 
 from gliderwatch import __version__
-from gliderwatch.figures import chart, dives, health, panel_svg, section_svg, timeline
+from gliderwatch.figures import chart, dives, field_svg, health, panel_svg, section_svg, timeline
 from gliderwatch.figures.coast import Land
 from gliderwatch.figures.plots import Panel
 from gliderwatch.figures.timeline import Bar
 from gliderwatch.messages.formatting import clean, duration, flow, utc
 from gliderwatch.model import Assessment, Flag, Severity
-from gliderwatch.pages import facts, maps
+from gliderwatch.pages import facts, fields, maps
 from gliderwatch.pages.call_log import call_log, transferred
+from gliderwatch.pages.fields import FieldView
 from gliderwatch.pages.view import GliderView, Verdict, verdict, worst_first
 
 HOUR, DAY = 3600.0, 86400.0
@@ -68,13 +69,22 @@ def file_of(glider: str, kind: str = "", ending: str = "html") -> str:
     return f"{'glider-' if name in {'index', 'gliders'} else ''}{name}{kind}.{ending}"
 
 
+def field_file(name: str) -> str:
+    """The name of the page of a field; with a dot, so that it is none of a glider.
+
+    >>> field_file("upper")
+    'field.upper.html'
+    """
+    return f"field.{file_of(name)}"
+
+
 def href(file: str) -> str:
     """The address of a file beside a page."""
     return file.replace("%", "%25")
 
 
-def fleet_page(views: tuple[GliderView, ...], frame: Frame, land: Land) -> str:
-    """The page of all gliders, the worst first."""
+def fleet_page(views: tuple[GliderView, ...], frame: Frame, land: Land, seas: Sequence[str] = ()) -> str:
+    """The page of all gliders, the worst first, with links to the pages of fields, `seas`."""
     ranked = worst_first(views)
     links = {view.name: href(file_of(view.name)) for view, _ in ranked}
     cards = [
@@ -91,7 +101,20 @@ def fleet_page(views: tuple[GliderView, ...], frame: Frame, land: Land) -> str:
     bars = [bar for view, found in ranked if found.rank >= 0 for bar in _bars(view, by_glider=True)]
     past = Markup(timeline.svg("Timeline of all gliders", bars, frame.now - PAST, frame.now))
     found = summary([f for _, f in ranked])
-    return _render("fleet.html", frame, cards=cards, map=picture, timeline=past, summary=found)
+    values = {"cards": cards, "map": picture, "timeline": past, "summary": found}
+    return _render("fleet.html", frame, **values, fields=_links(seas))
+
+
+def _links(seas: Iterable[str]) -> list[tuple[str, str]]:
+    return [(clean(name, 40), href(field_file(name))) for name in seas]
+
+
+def field_page(view: FieldView, frame: Frame, land: Land) -> str:
+    """The page of a field of the sea."""
+    plots = [
+        Plot(panel.title, shows, Markup(field_svg.svg(panel, land))) for panel, shows in fields.panels(view)
+    ]
+    return _render("field.html", frame, name=view.name, sentence=fields.sentence(view), plots=plots)
 
 
 def summary(found: Sequence[Verdict]) -> str:
@@ -143,6 +166,7 @@ def _glider_page(
         frame,
         **shared,
         sheet=href(file_of(view.name, "-sheet")),
+        fields=_links(field for field, _ in view.advice),
         messages=[facts.message_of(alert) for alert in view.alerts[:MESSAGES]],
         open=[(m, take_on.get(m.id, "")) for m in view.open_matters if m.can_be_taken_on],
         mute=take_on.get(view.name, ""),
@@ -269,7 +293,14 @@ def policy(texts: Iterable[str], scripts: Iterable[str]) -> str:
 
 @cache
 def _style() -> str:
-    return part("style.css") + chart.STYLE + panel_svg.STYLE + timeline.STYLE + section_svg.STYLE
+    return (
+        part("style.css")
+        + chart.STYLE
+        + panel_svg.STYLE
+        + timeline.STYLE
+        + section_svg.STYLE
+        + field_svg.STYLE
+    )
 
 
 def page_policy() -> str:

@@ -11,8 +11,9 @@ from pathlib import Path
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.figures.coast import Land
 from gliderwatch.health.rule import Limits
+from gliderwatch.pages.fields import fields_of, read_field
 from gliderwatch.pages.reading import read_fleet
-from gliderwatch.pages.render import Frame, both_pages, file_of, fleet_page
+from gliderwatch.pages.render import Frame, both_pages, field_file, field_page, file_of, fleet_page
 from gliderwatch.pages.view import GliderView
 from gliderwatch.params import Attention
 from gliderwatch.store.state_file import Store
@@ -32,9 +33,16 @@ def write_fleet(
     now: float,
     land: Land,
 ) -> None:
-    """Write the page of all gliders, those of `attention`. Raises GliderwatchError where that cannot be."""
+    """Write the page of all gliders, those of `attention`, and those of fields. Raises GliderwatchError where
+    that cannot be."""
     views = read_fleet(store, sorted(attention), lambda name: attention[name], now, batteries=batteries)
-    put(folder / FLEET, fleet_page(views, Frame(now, now + FLEET_DUE), land))
+    frame, seas = Frame(now, now + FLEET_DUE), list[str]()
+    for name in fields_of(store, now):
+        sea = read_field(store, name, now)
+        if sea is not None:
+            put(folder / field_file(name), field_page(sea, frame, land))
+            seas.append(name)
+    put(folder / FLEET, fleet_page(views, frame, land, seas))
 
 
 def write_glider(view: GliderView, folder: Path, land: Land) -> None:

@@ -47,8 +47,7 @@ class Fields:
 
     def begin(self, field: str, key: str) -> bool:
         """Begin a field again where `key`, that of its settings, is another than before; whether it was."""
-        row = self._db.execute("SELECT key FROM field_settings WHERE field = ?", (field,)).fetchone()
-        if row is not None and row[0] == key:
+        if self.settings(field) == key:
             return False
         self._db.execute("INSERT OR REPLACE INTO field_settings VALUES (?, ?)", (field, key))
         for table in ("field_batches", "field_checkpoints", "field_soundings", "field_advice"):
@@ -103,6 +102,11 @@ class Fields:
         after = run(start, self._batches(field, start), params)
         found = [each for each in after if each.bin < last]
         return found[-1] if found else start
+
+    def settings(self, field: str) -> str | None:
+        """The key of the settings that a field was begun with; None: there is no such field."""
+        row = self._db.execute("SELECT key FROM field_settings WHERE field = ?", (field,)).fetchone()
+        return None if row is None else str(row[0])
 
     def names(self) -> list[str]:
         """The fields of which there are batches."""

@@ -32,6 +32,7 @@ from gliderwatch.export.dives import assessment_line
 from gliderwatch.messages.formatting import clean
 from gliderwatch.messages.guide import PAGE
 from gliderwatch.pages import render
+from gliderwatch.pages.fields import fields_of
 from gliderwatch.pages.reading import names_of, read_fleet
 from gliderwatch.pages.render import Frame
 from gliderwatch.pages.view import GliderView, worst_first
@@ -191,10 +192,12 @@ class Site:
             names = names_of(store, config.gliders)
             for name in names:
                 marks |= dict.fromkeys(files_of(name), store.facts(name).newest())
+            fields = tuple(fields_of(store, time.time()))
         attention = {name: config.attention(name) for name in names}
         batteries = {name: battery_limits(config, name) for name in names}
-        shown = Shown(self.state, attention, batteries, config.maps.files, self.key)
-        return shown, marks | {FLEET: hash(tuple(marks.items())), PAGE: None}
+        shown = Shown(self.state, attention, batteries, fields, config.maps.files, self.key)
+        of_all = hash(tuple(marks.items()))
+        return shown, marks | dict.fromkeys((FLEET, *map(render.field_file, fields)), of_all) | {PAGE: None}
 
 
 # ----------------------------------------

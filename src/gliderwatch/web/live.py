@@ -14,6 +14,7 @@ from gliderwatch.figures.map_files import land_or_world
 from gliderwatch.health.rule import Limits
 from gliderwatch.messages.guide import PAGE
 from gliderwatch.pages import render
+from gliderwatch.pages.fields import read_field
 from gliderwatch.pages.guide import guide_page
 from gliderwatch.pages.reading import SHOWN, read_fleet, read_glider
 from gliderwatch.pages.render import Frame
@@ -36,11 +37,12 @@ _GZIP = 6
 @dataclass(frozen=True, slots=True)
 class Shown:
     """What is shown: the gliders of a state file, by name how the silence of each is taken and the limits of
-    its battery, with maps of the files ``maps``. Links are signed by ``key``."""
+    its battery; and ``fields``, with maps of the files ``maps``. Links are signed by ``key``."""
 
     state: Path
     attention: dict[str, Attention]
     batteries: dict[str, Limits | None]
+    fields: tuple[str, ...]
     maps: tuple[str, ...]
     key: str
 
@@ -103,7 +105,13 @@ def _text(job: LiveJob, frame: Frame) -> str:
         if job.file == FLEET:
             attention = shown.attention.__getitem__
             views = read_fleet(store, [*shown.attention], attention, frame.now, batteries=shown.batteries)
-            return render.fleet_page(views, frame, land)
+            return render.fleet_page(views, frame, land, shown.fields)
+        for name in shown.fields:
+            if job.file == render.field_file(name):
+                field = read_field(store, name, frame.now)
+                if field is None:
+                    raise KeyError(job.file)
+                return render.field_page(field, frame, land)
         kinds = {file: (name, kind) for name in shown.attention for file, kind in files_of(name).items()}
         name, kind = kinds[job.file]
         view = _view(shown, store, name, frame.now)
