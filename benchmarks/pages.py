@@ -99,7 +99,7 @@ def surfacing(path: Path, folder: Path, names: list[str], now: float) -> None:
     fleet = cost(lambda: page_writer.write_fleet(store, folder, attention, batteries, now, world()))
     one = cost(
         lambda: page_writer.write_glider(
-            store, folder, names[0], attention[names[0]], batteries[names[0]], now, world()
+            store, folder, names[0], attention[names[0]], batteries[names[0]], now, world(), {}
         )
     )
     store.close()

@@ -81,7 +81,8 @@ def test_the_field_of_the_fleet_is_that_of_the_sea(site: Path) -> None:
     done = command("field", "upper", "-c", "gliderwatch.yml", "--state", state, "--out", "u.nc", cwd=site)
     assert done.returncode == 0, done.stderr
     with Dataset(site / "u.nc") as file:
-        assert file.Conventions.startswith("CF-")
+        assert file.Conventions == "CF-1.8, ACDD-1.3"
+        assert file.geospatial_vertical_max == 100.0
         found, error = file["temperature"][0].data, file["temperature_error"][0].data
         assert file["temperature"].standard_name == "sea_water_temperature"
         assert file["temperature"].units == "degree_Celsius"

@@ -99,16 +99,47 @@ def remarks(path, name):
     }
 
 
+OURS = {
+    "institution": "Institute of the Sea",
+    "license": "CC-BY-4.0",
+    "project": "Boundary current",
+    "acknowledgement": "The crew",
+    **{
+        f"{who}_{what}": f"https://example.org/{what}"
+        for who in ("creator", "publisher")
+        for what in ("url", "email")
+    },
+    "publisher_name": "Institute of the Sea",
+}
+"""What only those whose data they are can say: `export.attributes`."""
+NAMELESS = {"t_dive", "depth_max", "speed_min", "speed_max", "p_e", "across_misfit"}
+"""Variables for which CF has no standard name, or one that only a coordinate should have."""
+
+
+def without_name(path):
+    with xr.open_dataset(path) as data:
+        return {
+            str(name) for name, variable in data.variables.items() if "standard_name" not in variable.attrs
+        }
+
+
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_netcdf_passes_the_checker_of_its_conventions(tmp_path):
-    netcdf.write(tmp_path / "x.nc", "electa", view().dives, NOW)
+    netcdf.write(tmp_path / "x.nc", "electa", view().dives, NOW, OURS)
     CheckSuite.load_all_available_checkers()
     assert remarks(tmp_path / "x.nc", "cf:1.8") == {"high": [], "medium": [], "low": []}
     found = remarks(tmp_path / "x.nc", "acdd:1.3")
-    assert {m for m in found["high"] if m != "standard_name"} == set()  # CF has no name for some quantities
-    # nobody has named who publishes it; a trajectory of dives has no depth
-    open_still = ("creator_", "publisher_", "institution", "project", "license", "acknowledg", "geospatial_")
-    assert [m for m in found["medium"] if not m.startswith(open_still)] == []
+    assert set(found["high"]) == {"standard_name"}
+    assert without_name(tmp_path / "x.nc") == NAMELESS | {"trajectory", "crs", "depth_bounds"}
+    assert found["medium"] == []
+    with xr.open_dataset(tmp_path / "x.nc") as data:
+        deepest = [d.evidence["depth_max"] for d in view().dives]
+        assert data.depth_bounds.values.tolist() == [[0.0, depth] for depth in deepest]
+        assert data.geospatial_vertical_max == max(deepest) / 2
+        assert data.institution == "Institute of the Sea"
+    netcdf.write(tmp_path / "y.nc", "electa", view().dives, NOW)  # nobody has said whose it is
+    open_still = {m.split()[0].split("/")[0] for m in remarks(tmp_path / "y.nc", "acdd:1.3")["medium"]}
+    assert {name.replace("acknowledgment", "acknowledgement") for name in open_still} == set(OURS)
 
 
 def advised(band):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -141,7 +141,7 @@ def export(
                 raise click.UsageError(
                     f"{form} is of one glider, into a file: name the GLIDER and --out FILE"
                 )
-            _write_netcdf(out, form, store, views[0])
+            _write_netcdf(out, form, store, views[0], config.export.attributes if config is not None else {})
             return
         if form == "csv":
             text = dives.as_csv([dive for view in views for dive in view.dives])
@@ -153,15 +153,17 @@ def export(
         out.write_text(text, encoding="utf-8")
 
 
-def _write_netcdf(out: Path, form: str, store: Store, view: GliderView) -> None:
+def _write_netcdf(
+    out: Path, form: str, store: Store, view: GliderView, attributes: Mapping[str, str]
+) -> None:
     from gliderwatch.export import netcdf, sections
     from gliderwatch.pages import reading
 
     if form == "netcdf":
-        netcdf.write(out, view.name, view.dives, view.now)
+        netcdf.write(out, view.name, view.dives, view.now, attributes)
         return
     found, advice = reading.read_section(store, view.name, _ALL)
-    sections.write(out, view.name, found, advice, view.dives, view.now)
+    sections.write(out, view.name, found, advice, view.dives, view.now, attributes)
 
 
 @click.command(epilog=example("gliderwatch where electa", "gliderwatch where electa --ais 992441234"))
@@ -249,7 +251,7 @@ def field(config_path: Path, name: str, out: Path, at: str | None, state: Path |
     path = not_on_dockserver(config, out)
     path.parent.mkdir(parents=True, exist_ok=True)
     with Store.looking(state if state is not None else Path(config.state.path)) as store:
-        written = write_field(store, found[name], path, t)
+        written = write_field(store, found[name], path, t, time.time(), config.export.attributes)
     click.echo(f"{path}: {name} at {utc(written)}")
 
 

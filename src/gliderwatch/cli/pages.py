@@ -37,7 +37,7 @@ def pages(config_path: Path | None, state: Path | None, out: Path | None, at: st
     folder = out or (Path(config.pages.folder) if config is not None and config.pages.folder else None)
     if folder is None:
         raise click.UsageError("name the folder: --out FOLDER, or pages.folder in the configuration")
-    land = world()
+    land, attributes = world(), config.export.attributes if config is not None else {}
     if config is not None:
         not_on_dockserver(config, folder / "index.html")
         land, reason = land_or_world(config.maps.files)
@@ -49,7 +49,8 @@ def pages(config_path: Path | None, state: Path | None, out: Path | None, at: st
         batteries = {n: page_writer.battery_limits(config, n) for n in names}
         page_writer.write_fleet(store, folder, attention, batteries, now, land)
         for name in names:
-            page_writer.write_glider(store, folder, name, attention[name], batteries[name], now, land)
+            limits = batteries[name]
+            page_writer.write_glider(store, folder, name, attention[name], limits, now, land, attributes)
     click.echo(f"{folder / 'index.html'}: {len(names)} glider{'' if len(names) == 1 else 's'}")
 
 

@@ -171,11 +171,24 @@ def _references(value: SecretStr) -> SecretStr:
 # Strict: quoted numbers and `true` for 1 are mistakes. Bounds only refuse what cannot be meant.
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Count = Annotated[int, Field(strict=True, ge=1, le=100)]
+_MADE = ("Conventions", "featureType", "geospatial_", "time_coverage_", "date_")
+
+
+def _free(name: str) -> str:
+    """The name of an attribute that gliderwatch does not make from what is in the file. Raises ValueError."""
+    if name.startswith(_MADE):
+        raise ValueError(f"{name} is made from what is in the file: leave it out")
+    return name
+
+
 Switch = Annotated[bool, BeforeValidator(_switch)]
 Speed = Annotated[Number, Field(ge=0, le=5)]
 AbsolutePath = Annotated[str, StringConstraints(min_length=1), AfterValidator(absolute)]
 GliderName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", to_lower=True)]
 Name = Annotated[str, StringConstraints(pattern=r"^\w[\w .-]*$", max_length=64)]
+AttributeName = Annotated[
+    str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64), AfterValidator(_free)
+]
 Loudness = Annotated[
     Severity,
     BeforeValidator(_severity),

@@ -19,6 +19,7 @@ from gliderwatch.config.schema import (
     Ais,
     Channel,
     Dockserver,
+    Export,
     FieldSetting,
     Glider,
     Heartbeat,
@@ -70,6 +71,7 @@ class Config(Section):
     metrics: Metrics = Field(default=Metrics(), description="For Prometheus.")
     maps: Maps = Field(default=Maps(), description="Finer maps.")
     pages: Pages = Field(default=Pages(), description="Pages for pilots as files.")
+    export: Export = Field(default=Export(), description="Files for other programs.")
     ais: Ais = Field(default=Ais(), description="Virtual AIS.")
     web: Web = Field(default=Web(), description="The pages live.")
     _document: Document = PrivateAttr(Document(Path("configuration"), None, {}))

@@ -10,6 +10,7 @@ from pydantic import AnyHttpUrl, Field, IPvAnyAddress, model_validator
 
 from gliderwatch.config.fields import (
     AbsolutePath,
+    AttributeName,
     ClockTime,
     Count,
     GliderName,
@@ -522,6 +523,17 @@ class Pages(Section):
     folder: AbsolutePath | None = Field(
         default=None,
         description="The folder in which they are kept up to date; made if need be. null: none are written.",
+    )
+
+
+class Export(Section):
+    """Files for other programs, which lie beside the pages and are made by `gliderwatch export`."""
+
+    attributes: dict[AttributeName, str] = Field(
+        default_factory=dict,
+        description="Global attributes of NetCDF files that gliderwatch cannot know: by ACDD `institution`, "
+        "`license`, `project`, `acknowledgement`, `creator_url`, `creator_email`, `publisher_name`, "
+        "`publisher_url`, `publisher_email`, ... They go before its own.",
     )
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import netCDF4
 import numpy as np
@@ -16,6 +17,7 @@ from gliderwatch.model import Array, Assessment
 
 FLAGS = {-127: "no_judgement", 0: "normal", 1: "speed_out_of_range", 2: "measurements_disagree"}
 SINCE = "seconds since 1970-01-01T00:00:00Z"
+NOTHING: Mapping[str, str] = MappingProxyType({})
 _FILL = -9999.0
 _Value = Callable[[Assessment], float | None]
 _AXES = (
@@ -25,8 +27,15 @@ _AXES = (
 )
 
 
-def write(path: Path, glider: str, dives: Sequence[Assessment], now: float) -> None:
-    """Write the dives of a glider whose place is known, in order of time; made at `now` (s).
+def write(
+    path: Path,
+    glider: str,
+    dives: Sequence[Assessment],
+    now: float,
+    attributes: Mapping[str, str] = NOTHING,
+) -> None:
+    """Write the dives of a glider whose place is known, in order of time, with `attributes` of those whose
+    data they are; made at `now` (s).
 
     Raises GliderwatchError where there is none, or the file cannot be written.
     """
@@ -41,10 +50,11 @@ def write(path: Path, glider: str, dives: Sequence[Assessment], now: float) -> N
                 _values(placed, value) for value in (lambda d: d.t_surface, lambda d: d.lat, lambda d: d.lon)
             )
             coordinates(data, clean(glider), "obs", {"time": t, "lat": lat, "lon": lon})
+            common = about(clean(glider), t, lat, lon, now) | _depths(data, placed)
             _flags(data, placed)
             for column in COLUMNS:
                 _column(data, column, placed)
-            data.setncatts(_about(clean(glider), about(clean(glider), t, lat, lon, now)))
+            data.setncatts(_about(clean(glider), common) | {**attributes})
     except (OSError, RuntimeError) as error:
         raise GliderwatchError(f"{path} cannot be written: {error}") from None
 
@@ -83,6 +93,8 @@ def _column(data: netCDF4.Dataset, column: Column, dives: Sequence[Assessment]) 
         attributes["standard_name"] = column.standard_name
     if column.unit.startswith("seconds since"):
         attributes |= {"calendar": "standard", "coverage_content_type": "coordinate"}
+    if "depth" in data.variables:
+        attributes["coordinates"] = "time lat lon depth"
     variable(data, column.name, ("obs",), _values(dives, column.value), attributes)
 
 
@@ -127,16 +139,55 @@ def _about(glider: str, common: dict[str, object]) -> dict[str, object]:
         "errors, and a flag that says whether the speed is out of its normal range.",
         "keywords": "EARTH SCIENCE > OCEANS > OCEAN CIRCULATION > OCEAN CURRENTS",
         "id": f"gliderwatch-{glider}-{str(common['time_coverage_start'])[:10]}",
-        "comment": "flag -127: the dive could not be judged",
+        "comment": "flag -127: the dive could not be judged; time, lat, lon: of the surfacing; depth_bounds: "
+        "the depths that speed and current are means over",
+    }
+
+
+def _depths(data: netCDF4.Dataset, dives: Sequence[Assessment]) -> dict[str, object]:
+    """The depths that each row is a mean over, as their middle and its bounds, and the global attributes of
+    them."""
+    deepest = _values(dives, lambda d: d.evidence.get("depth_max"))
+    if not np.isfinite(deepest).any():
+        return {}
+    data.createDimension("nv", 2)
+    depth = data.createVariable("depth", "f8", ("obs",), fill_value=_FILL)
+    depth.setncatts(
+        {
+            "standard_name": "depth",
+            "long_name": "middle of the depths of the dive",
+            "units": "m",
+            "positive": "down",
+            "axis": "Z",
+            "bounds": "depth_bounds",
+            "coverage_content_type": "coordinate",
+        }
+    )
+    depth[:] = np.where(np.isfinite(deepest), deepest / 2, _FILL)
+    bounds = data.createVariable("depth_bounds", "f8", ("obs", "nv"))  # its fill value is that of depth
+    bounds[:] = np.where(np.isfinite(deepest)[:, None], np.outer(deepest, [0.0, 1.0]), _FILL)
+    return vertical(float(np.nanmin(deepest / 2)), float(np.nanmax(deepest / 2)))
+
+
+def vertical(top: float, bottom: float) -> dict[str, object]:
+    """The global attributes of the depths (m) that a file is of."""
+    return {
+        "geospatial_vertical_min": top,
+        "geospatial_vertical_max": bottom,
+        "geospatial_vertical_positive": "down",
+        "geospatial_vertical_units": "m",
+        "geospatial_bounds_vertical_crs": "EPSG:5831",
     }
 
 
 def about(glider: str, t: Array, lat: Array, lon: Array, now: float) -> dict[str, object]:
-    """The global attributes that all files of a glider have: who made it, when and where.
+    """The global attributes that all files have: who made it, when and where. `glider` may be a fleet.
 
     `t` (n,) in s, `lat` and `lon` (n,) in degrees.
     """
     made = iso(now)
+    south, north, west, east = (float(x) for x in (lat.min(), lat.max(), lon.min(), lon.max()))
+    corners = ((south, west), (south, east), (north, east), (north, west), (south, west))
     return {
         "Conventions": "CF-1.8, ACDD-1.3",
         "keywords_vocabulary": "GCMD Science Keywords",
@@ -149,12 +200,13 @@ def about(glider: str, t: Array, lat: Array, lon: Array, now: float) -> dict[str
         "date_created": made,
         "date_modified": made,
         "creator_name": "gliderwatch",
-        "geospatial_lat_min": float(lat.min()),
-        "geospatial_lat_max": float(lat.max()),
+        "geospatial_lat_min": south,
+        "geospatial_lat_max": north,
         "geospatial_lat_units": "degrees_north",
-        "geospatial_lon_min": float(lon.min()),
-        "geospatial_lon_max": float(lon.max()),
+        "geospatial_lon_min": west,
+        "geospatial_lon_max": east,
         "geospatial_lon_units": "degrees_east",
+        "geospatial_bounds": f"POLYGON (({', '.join(f'{x:.5f} {y:.5f}' for x, y in corners)}))",
         "geospatial_bounds_crs": "EPSG:4326",
         "time_coverage_start": iso(float(t[0])),
         "time_coverage_end": iso(float(t[-1])),

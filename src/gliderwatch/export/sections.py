@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import netCDF4
@@ -24,9 +24,10 @@ def write(
     advice: Sequence[LayerAdvice],
     dives: Sequence[Assessment],
     now: float,
+    attributes: Mapping[str, str] = netcdf.NOTHING,
 ) -> None:
-    """Write a section, what was found and advised after each of its profiles, and where they were; made at
-    `now` (s).
+    """Write a section, what was found and advised after each of its profiles, and where they were, with
+    `attributes` of those whose data they are; made at `now` (s).
 
     `advice` (n,) belongs to the profiles of `found`; the places of `dives` are interpolated to them.
     Raises GliderwatchError where there is no profile or no place, or the file cannot be written.
@@ -45,7 +46,7 @@ def write(
             _property(data, found, advice[0].sensor)
             _layers(data, advice)
             _bands(data, advice)
-            data.setncatts(_about(name, found, lat, lon, now))
+            data.setncatts(_about(name, found, lat, lon, now) | {**attributes})
     except (OSError, RuntimeError) as error:
         raise GliderwatchError(f"{path} cannot be written: {error}") from None
 
@@ -116,7 +117,8 @@ def _bands(data: netCDF4.Dataset, advice: Sequence[LayerAdvice]) -> None:
 
 
 def _about(name: str, found: Section, lat: Array, lon: Array, now: float) -> dict[str, object]:
-    return netcdf.about(name, found.t, lat, lon, now) | {
+    common = netcdf.about(name, found.t, lat, lon, now) | netcdf.vertical(0.0, float(found.edges[-1]))
+    return common | {
         "featureType": "profile",
         "title": f"Section and layers along the way of the underwater glider {name}",
         "summary": "One profile a segment of a Slocum glider, the mean of its casts, with the layers in "
@@ -124,8 +126,4 @@ def _about(name: str, found: Section, lat: Array, lon: Array, now: float) -> dic
         "keywords": "EARTH SCIENCE > OCEANS > OCEAN TEMPERATURE > THERMOCLINE",
         "id": f"gliderwatch-{name}-layers",
         "comment": "no layer: fill values; no band: all depths were advised",
-        "geospatial_vertical_min": 0.0,
-        "geospatial_vertical_max": float(found.edges[-1]),
-        "geospatial_vertical_positive": "down",
-        "geospatial_vertical_units": "m",
     }

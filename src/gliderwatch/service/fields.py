@@ -3,7 +3,7 @@ field as a file."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import atan2, hypot, inf
 from pathlib import Path
@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from gliderwatch import __version__
 from gliderwatch.config import Config
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.export.properties import PROPERTIES
@@ -214,9 +213,11 @@ ACROSS, DOWN = 31, 21
 bottom."""
 
 
-def write_field(store: Store, field: FleetField, path: Path, t: float | None = None) -> float:
+def write_field(
+    store: Store, field: FleetField, path: Path, t: float | None, now: float, attributes: Mapping[str, str]
+) -> float:
     """Write what is known of a field at a time (s; None: of its last samples) by the samples until then, to
-    the hour; that time.
+    the hour, with `attributes` of those whose data they are, at `now` (s); that time.
 
     Raises GliderwatchError where there are no samples, or the file cannot be written.
     """
@@ -241,6 +242,7 @@ def write_field(store: Store, field: FleetField, path: Path, t: float | None = N
     try:
         with Dataset(path, "w", format="NETCDF4") as file:
             _fill(file, field, t, (depth, lat, lon), values)
+            file.setncatts(_about(field, t, (depth, lat, lon), now) | {**attributes})
     except OSError as error:
         raise GliderwatchError(f"{path} cannot be written: {error.strerror or error}") from None
     return t
@@ -249,31 +251,47 @@ def write_field(store: Store, field: FleetField, path: Path, t: float | None = N
 def _fill(
     file: Dataset, field: FleetField, t: float, axes: tuple[Array, Array, Array], values: tuple[Array, Array]
 ) -> None:
-    file.setncatts(
-        {
-            "Conventions": "CF-1.8",
-            "title": f"{field.name}: field estimated from the samples of gliders",
-            "source": f"gliderwatch {__version__}, estimator {field.params.estimator}",
-            "references": "Distributed estimation of 3D fields by underwater gliders, CMRE-PR-2019-095",
-        }
-    )
     spaces = {
-        "time": (np.array([t]), {"units": "seconds since 1970-01-01T00:00:00Z", "standard_name": "time"}),
-        "depth": (axes[0], {"units": "m", "standard_name": "depth", "positive": "down"}),
-        "latitude": (axes[1], {"units": "degrees_north", "standard_name": "latitude"}),
-        "longitude": (axes[2], {"units": "degrees_east", "standard_name": "longitude"}),
+        "time": (
+            np.array([t]),
+            {"units": "seconds since 1970-01-01T00:00:00Z", "axis": "T", "standard_name": "time"},
+        ),
+        "depth": (axes[0], {"units": "m", "standard_name": "depth", "positive": "down", "axis": "Z"}),
+        "latitude": (axes[1], {"units": "degrees_north", "standard_name": "latitude", "axis": "Y"}),
+        "longitude": (axes[2], {"units": "degrees_east", "standard_name": "longitude", "axis": "X"}),
     }
     for name, (points, attributes) in spaces.items():
         file.createDimension(name, len(points))
         variable = file.createVariable(name, "f8", (name,))
-        variable.setncatts(attributes)
+        about = {"long_name": f"{name} of the field", "coverage_content_type": "coordinate"}
+        variable.setncatts(attributes | about)
         variable[:] = points
     name = "temperature" if field.sensor == "sci_water_temp" else field.sensor
     unit, standard = PROPERTIES[name]
     shape = (1, *(len(axis) for axis in axes))
     for each, suffix, modifier in zip(values, ("", "_error"), ("", " standard_error"), strict=True):
         variable = file.createVariable(name + suffix, "f4", tuple(spaces), zlib=True)
-        variable.setncatts({"units": unit, "standard_name": standard + modifier})
+        long_name = f"{name} as estimated from the samples of gliders{', its standard error' * bool(suffix)}"
+        about = {"long_name": long_name, "coverage_content_type": "modelResult"}
+        variable.setncatts({"units": unit, "standard_name": standard + modifier} | about)
         if not suffix:
             variable.setncatts({"ancillary_variables": f"{name}_error"})
         variable[:] = each.reshape(shape)
+
+
+def _about(field: FleetField, t: float, axes: tuple[Array, Array, Array], now: float) -> dict[str, object]:
+    """The global attributes of the file of a field."""
+    from gliderwatch.export import netcdf  # noqa: PLC0415 (the daemon writes none)
+
+    depth, lat, lon = axes
+    common = netcdf.about("gliders", np.array([t]), lat, lon, now)
+    common |= netcdf.vertical(float(depth[0]), float(depth[-1]))
+    return common | {
+        "title": f"{field.name}: field estimated from the samples of gliders",
+        "summary": f"The field of {field.sensor} in a box of the sea at one time, and its standard error, "
+        f"estimated from samples of underwater gliders by the estimator {field.params.estimator}.",
+        "keywords": "EARTH SCIENCE > OCEANS",
+        "id": f"gliderwatch-{field.name}-{common['time_coverage_start']}",
+        "comment": "the error is of the estimate, not of a sample",
+        "references": "Distributed estimation of 3D fields by underwater gliders, CMRE-PR-2019-095",
+    }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from functools import partial
@@ -37,8 +37,8 @@ _NICENESS = 10
 @dataclass(frozen=True, slots=True)
 class PageJob:
     """What is to be written: the pages of a ``glider``, or, where that is empty, the one of all, with maps of
-    the files ``maps``. By glider: how its silence is taken, and the limits of its battery (None: that is not
-    looked at)."""
+    the files ``maps`` and ``attributes`` in NetCDF files. By glider: how its silence is taken, and the limits
+    of its battery (None: that is not looked at)."""
 
     state: Path
     folder: Path
@@ -46,6 +46,7 @@ class PageJob:
     batteries: dict[str, Limits | None] = field(default_factory=dict)
     glider: str = ""
     maps: tuple[str, ...] = ()
+    attributes: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +65,8 @@ def write(job: PageJob) -> str:
     with Store.looking(job.state) as store:
         if job.glider:
             name, limits = job.glider, job.batteries.get(job.glider)
-            write_glider(store, job.folder, name, job.attention[name], limits, now, land)
+            attention = job.attention[name]
+            write_glider(store, job.folder, name, attention, limits, now, land, job.attributes)
         else:
             write_fleet(store, job.folder, job.attention, job.batteries, now, land)
     return reason
@@ -108,8 +110,10 @@ def write_glider(
     battery: Limits | None,
     now: float,
     land: Land,
+    attributes: Mapping[str, str],
 ) -> None:
-    """Write what is of one glider, as known at `now` (s). Raises GliderwatchError."""
+    """Write what is of one glider, as known at `now` (s), with `attributes` in its NetCDF file. Raises
+    GliderwatchError."""
     from gliderwatch.export import dives, maps, netcdf
     from gliderwatch.pages import reading, render, writing
 
@@ -121,7 +125,7 @@ def write_glider(
     writing.put(folder / render.file_of(name, ending="csv"), dives.as_csv(every))
     if any(dive.lat is not None and dive.lon is not None for dive in every):
         with writing.replacing(folder / render.file_of(name, ending="nc")) as part:
-            netcdf.write(part, name, every, now)
+            netcdf.write(part, name, every, now, attributes)
 
 
 class PageWriter:
@@ -173,7 +177,8 @@ class PageWriter:
             attention = {each: config.attention(each) for each in some}
             batteries = {each: battery_limits(config, each) for each in some}
             state, folder = Path(config.state.path), Path(config.pages.folder)
-            self._begin(PageJob(state, folder, attention, batteries, name, config.maps.files))
+            maps, attributes = config.maps.files, config.export.attributes
+            self._begin(PageJob(state, folder, attention, batteries, name, maps, attributes))
 
     @property
     def is_idle(self) -> bool:
