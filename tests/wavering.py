@@ -101,6 +101,7 @@ def count(messages: Sequence[Told], hours: float) -> int:
 def wavers(messages: Sequence[Told]) -> list[str]:
     """Where a message contradicts one before without saying why, in words."""
     found, open_ones, over = list[str](), dict[str, Alert](), dict[Kind, float]()
+    found_by_rules = dict[str, Alert]()
     for hours, a in ((each.hours, each.alert) for each in messages):
         others = [each for thread, each in open_ones.items() if thread != a.incident]
         if a.kind in TROUBLE:
@@ -109,11 +110,16 @@ def wavers(messages: Sequence[Told]) -> list[str]:
             if others and not a.body.count("more likely"):
                 found.append(f"{hours:.0f} h: {a.title}: while another was open: {others[0].title}")
             open_ones[a.incident] = a
+        elif a.kind is Kind.HEALTH:
+            found_by_rules[a.incident] = a
         elif a.kind is Kind.REMINDER and a.incident.split("/")[1:2] in ([k.value] for k in TROUBLE):
             if a.incident not in open_ones:
                 found.append(f"{hours:.0f} h: {a.title}: of what was not open")
+        elif a.kind is Kind.ALL_CLEAR and found_by_rules.pop(a.incident, None) is not None:
+            if others and "ALL CLEAR" in a.title:
+                found.append(f"{hours:.0f} h: {a.title}: while another was open: {others[0].title}")
         elif a.kind is Kind.ALL_CLEAR and a.incident in open_ones:
-            if others and "still open" not in a.title:
+            if others and "still open" not in a.title.lower():
                 found.append(f"{hours:.0f} h: {a.title}: while another was open: {others[0].title}")
             over[open_ones.pop(a.incident).kind] = hours
         elif a.kind is Kind.CORRECTION and "withdrawn" in a.title and a.incident in open_ones:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import pytest
 
+from alert_support import SLOW, incident
 from gliderwatch.health.rule import Finding
 from gliderwatch.health.rules import RULES
 from gliderwatch.incidents.acknowledgement import acknowledge_thread
 from gliderwatch.incidents.health import HealthThread, announce, health_incidents
-from gliderwatch.incidents.notices import HealthFound, HealthOver, HealthReminder, Notice
+from gliderwatch.incidents.notices import HealthFound, HealthOver, HealthReminder, Notice, Situation
 from gliderwatch.messages.health_text import blocks
 from gliderwatch.messages.notice_text import render
-from gliderwatch.model import Fix, Kind, Severity
+from gliderwatch.model import Fix, Incident, Kind, Severity
 
 T0, HOUR = 1.7e9, 3600.0
 Row = tuple[float, dict[str, Finding | None]]
@@ -118,6 +120,49 @@ def test_every_rule_has_words(rule: str) -> None:
 def test_blocks_rise_with_values() -> None:
     assert blocks([1.0, 2.0, 3.0]) == "▁▅█"
     assert all(a <= b for a, b in itertools.pairwise(blocks([float(v) for v in range(10)])))
+
+
+def rolling(cleared: float | None = None, low: float = -0.1) -> Incident:
+    """An anomaly from `T0` + 2 h on of a glider that rolls by 0.4 rad where `low` to 0.2 are usual."""
+    evidence = {"roll_mean": 0.4, "roll_mean_low": low, "roll_mean_high": 0.2 if low < 0 else 0.5}
+    return incident(replace(SLOW, evidence=evidence), since=T0 + 2 * HOUR, cleared_at=cleared)
+
+
+def roll(n: int, of: int) -> list[Row]:
+    """`of` rows of which the first `n` find a roll."""
+    times = [T0 + 3 * HOUR * k for k in range(1, of + 1)]
+    return [(t, {"roll": finding(t, W, "roll") if k < n else None}) for k, t in enumerate(times)]
+
+
+def test_roll_beside_an_anomaly_that_rolls_is_no_incident_of_its_own() -> None:
+    assert announce((), "a", roll(1, 1), None, {}, 24.0, (rolling(),)) == ((), [])
+    straight = rolling(low=0.3)  # slow, but it rolls as usual
+    assert len(announce((), "a", roll(1, 1), None, {}, 24.0, (straight,))[1]) == 1
+    vacuum = announce((), "a", rows(W), None, {}, 24.0, (rolling(),))[1]
+    assert len(vacuum) == 1
+
+
+def test_roll_reported_before_the_anomaly_joins_it_without_an_all_clear() -> None:
+    threads, (first,) = announce((), "a", roll(1, 1), None, {}, 24.0)
+    for n in range(2, 60):
+        threads, none = announce(threads, "a", roll(n, n), None, {}, 24.0, (rolling(),))
+        assert none == [] and threads[0].is_over
+    for n in range(60, 66):
+        threads, none = announce(threads, "a", roll(59, n), None, {}, 24.0, (rolling(),))
+        assert none == []
+    over = rolling(cleared=T0 + 200 * HOUR)
+    assert announce(threads, "a", roll(59, 66), None, {}, 24.0, (over,))[1] == []
+    (again,) = announce(threads, "a", roll(70, 70), None, {}, 24.0, (over,))[1]  # it still rolls
+    assert isinstance(again.content, HealthFound) and again.thread == first.thread
+
+
+def test_all_clear_says_what_is_still_open() -> None:
+    *_, over = notices(rows(W, *[None] * 4))
+    assert isinstance(over.content, HealthOver)
+    content = replace(over.content, situation=Situation(others=(rolling(),)))
+    alert = render(replace(over, content=content))
+    assert alert.title == "a anomaly STILL OPEN, vacuum is over"
+    assert "Go on with what is still open" in alert.body
 
 
 def test_trend_is_over_after_two_days_of_files() -> None:

@@ -122,6 +122,16 @@ def test_roll_steps_against_its_own() -> None:
     assert found("roll", history(wide, {"roll_in_flight": [0.67, 0.67]})) is None
 
 
+def test_roll_that_stays_off_is_not_taken_for_usual() -> None:
+    rng = np.random.default_rng(1)
+    usual, off = 0.1 + 0.02 * rng.standard_normal(20), 0.5 + 0.02 * rng.standard_normal(120)
+    lost = {"roll_in_flight": [*usual.tolist(), *off.tolist()]}
+    still = found("roll", history(lost, {"roll_in_flight": [0.5]}))
+    assert still is not None and still.t == T0 + 20 * HOUR
+    assert "off the usual 5.9" in still.text
+    assert found("roll", history(lost, {"roll_in_flight": [0.1]})) is None
+
+
 def test_motor_that_does_not_do_what_is_commanded() -> None:
     before = {"ballast_error": [1e-6, -1e-6, 2e-6] * 5}
     assert severity(found("motors", history(before, {"ballast_error": [-60e-6, -60e-6]}))) == WARNING

@@ -11,7 +11,7 @@ import numpy as np
 from gliderwatch.health.constants import BEYOND, MOVED, USUAL_FILES
 from gliderwatch.health.readings import COMMANDED, History
 from gliderwatch.health.rule import Finding, Limit, Limits, Rule, below, found, loudest, spread
-from gliderwatch.model import Severity
+from gliderwatch.model import Array, Severity
 
 _DEGREE = float(np.radians(1))
 
@@ -67,21 +67,34 @@ def _step(
     least: float,
     beyond: float = BEYOND,
 ) -> Finding | None:
-    """A value that is twice in a row beyond the usual ones of the files before by ``least`` (SI) or more."""
+    """A value that is twice in a row beyond the usual ones of the files before by ``least`` (SI) or more, or
+    was at a time before and has been so ever since."""
     series = history.get(quantity)
-    usual = series.v[:-2]
-    if quantity not in history.fresh or len(usual) < USUAL_FILES:
+    if quantity not in history.fresh or len(series) < USUAL_FILES + 2:
         return None
-    middle, sigma = spread(usual, least / beyond)
-    limit = max(beyond * sigma, least)
-    off = series.v[-2:] - middle
-    if not (off > limit).all() and not (off < -limit).all():
-        return None
-    text = (
-        f"{what} {series.v[-1] * scale:.1f} {unit}, twice in a row {abs(off[-1]) * scale:.1f} off the usual "
-        f"{middle * scale:.1f}"
-    )
-    return found(rule, Severity.WARNING, float(series.t[-2]), text, history, quantity)
+    for n in _row_lengths(series.v, least):
+        middle, sigma = spread(series.v[:-n], least / beyond)
+        limit = max(beyond * sigma, least)
+        off = series.v[-n:] - middle
+        if (off > limit).all() or (off < -limit).all():
+            text = (
+                f"{what} {series.v[-1] * scale:.1f} {unit}, twice in a row {abs(off[-1]) * scale:.1f} off "
+                f"the usual {middle * scale:.1f}"
+            )
+            return found(rule, Severity.WARNING, float(series.t[-n]), text, history, quantity)
+    return None
+
+
+def _row_lengths(values: Array, least: float) -> list[int]:
+    """How many of the last values, two and more, may be off by ``least`` from those before them, longest row
+    first: all of them are beyond the lowest, or below the highest, of these."""
+    ends = values[::-1]
+    lowest, highest = np.minimum.accumulate(values), np.maximum.accumulate(values)
+    n = np.arange(2, len(values) - USUAL_FILES + 1)
+    head = len(values) - n - 1
+    above = np.minimum.accumulate(ends)[n - 1] - lowest[head] > least
+    below = highest[head] - np.maximum.accumulate(ends)[n - 1] > least
+    return [int(each) for each in n[above | below][::-1]]
 
 
 ALTITUDE = Rule(

@@ -143,6 +143,6 @@ def _of_health(
         return notified, []
     fix = facts.last_fix(now - GONE)
     threads, notices = health.announce(
-        notified.health, facts.glider, rows, fix, wanted.acks, wanted.reminder_hours
+        notified.health, facts.glider, rows, fix, wanted.acks, wanted.reminder_hours, facts.incidents()
     )
     return replace(notified, health=threads), notices

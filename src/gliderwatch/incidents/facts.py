@@ -11,6 +11,7 @@ from gliderwatch.incidents.constants import TREND_DIVES
 from gliderwatch.incidents.notices import (
     DiffersFromNeighbours,
     HealthFound,
+    HealthOver,
     HealthReminder,
     Notice,
     Situation,
@@ -60,7 +61,7 @@ def informed(notices: Sequence[Notice], facts: Facts) -> list[Notice]:
     now = situation(facts)
     return [
         replace(each, content=replace(each.content, situation=now))
-        if isinstance(each.content, HealthFound | HealthReminder | DiffersFromNeighbours)
+        if isinstance(each.content, HealthFound | HealthReminder | HealthOver | DiffersFromNeighbours)
         else each
         for each in notices
     ]

@@ -6,9 +6,11 @@ and what people have been notified of, as for all incidents.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from gliderwatch.health.attitude import ROLL
 from gliderwatch.health.constants import REMEMBERED
 from gliderwatch.health.rule import Finding
 from gliderwatch.health.rules import RULES, Judged
@@ -25,7 +27,7 @@ from gliderwatch.incidents.notices import (
 from gliderwatch.incidents.send_schedule import is_reminder_due
 from gliderwatch.incidents.state_machine import TRANSITIONS, Event, Phase
 from gliderwatch.incidents.threads import by_thread, thread_id
-from gliderwatch.model import Fix, Kind, Severity
+from gliderwatch.model import Assessment, Fix, Incident, Kind, Severity
 
 
 def health_incidents(glider: str, rows: Iterable[tuple[float, Judged]]) -> tuple[HealthIncident, ...]:
@@ -84,12 +86,24 @@ class HealthThread:
 
 @dataclass(frozen=True, slots=True)
 class _Now:
-    """What decides on the notices that are due: the ``latest`` reading (s), the last fix, acks."""
+    """What decides on the notices that are due: the ``latest`` reading (s), the last fix, acks, and the
+    ``rolling`` anomalies of dives."""
 
     latest: float
     fix: Fix | None
     acks: Acks
     reminder_hours: float | None
+    rolling: tuple[Incident, ...]
+
+    def is_explained(self, incident: HealthIncident) -> bool:
+        """Whether an anomaly stands for it: one fault is one incident. Of a roll that goes on only one that
+        is open does."""
+        end = math.inf if incident.cleared_at is None else incident.cleared_at
+        return incident.rule == ROLL.name and any(
+            each.since <= end
+            and (each.cleared_at is None or (end < math.inf and incident.since <= each.cleared_at))
+            for each in self.rolling
+        )
 
 
 def announce(
@@ -99,15 +113,18 @@ def announce(
     fix: Fix | None,
     acks: Acks,
     reminder_hours: float | None,
+    anomalies: Iterable[Incident] = (),
 ) -> tuple[tuple[HealthThread, ...], list[Notice]]:
     """What people have been notified of after the notices that are due, and these.
 
     `rows` is what the rules found in the segments and calls, in order of time (s); `fix` the glider's
-    last. Of what somebody has acknowledged (`acks`) nobody is reminded, unless it has grown worse.
+    last. Of what somebody has acknowledged (`acks`) nobody is reminded, unless it has grown worse. The
+    `anomalies` of dives of which the roll is evidence stand for what is found of the roll.
     """
     if not rows:
         return before, []
-    now = _Now(rows[-1][0], fix, acks, reminder_hours)
+    rolling = tuple(i for i in anomalies if i.kind is Kind.ANOMALY and (_rolls(i.worst) or _rolls(i.last)))
+    now = _Now(rows[-1][0], fix, acks, reminder_hours, rolling)
     incidents = health_incidents(glider, rows)
     matched = _matched(before, incidents)
     threads, notices = list[HealthThread](), list[Notice]()
@@ -118,7 +135,7 @@ def announce(
     old, used = {i.id for i in matched.values()}, {t.id for t in threads}
     for incident in incidents:
         is_news = incident.cleared_at is None or now.latest - incident.cleared_at < NEWS
-        if incident.id not in old and is_news:
+        if incident.id not in old and is_news and not now.is_explained(incident):
             identity = thread_id(incident.id, used)
             used.add(identity)
             thread = HealthThread(identity, incident, 0, now.latest)
@@ -129,6 +146,12 @@ def announce(
                 notices += more
             threads.append(thread)
     return tuple(t for t in threads if not _is_past(t, now.latest)), notices
+
+
+def _rolls(dive: Assessment) -> bool:
+    """Whether a dive rolls otherwise than usual."""
+    roll, low, high = (dive.evidence.get(f"roll_mean{each}") for each in ("", "_low", "_high"))
+    return roll is not None and low is not None and high is not None and not low <= roll <= high
 
 
 def _is_past(thread: HealthThread, latest: float) -> bool:
@@ -156,7 +179,10 @@ def _overlaps(now: HealthIncident, reported: HealthIncident) -> bool:
 def _continued(
     thread: HealthThread, incident: HealthIncident | None, now: _Now
 ) -> tuple[HealthThread, list[Notice]]:
-    """A thread after what is so now, and the notice that is due."""
+    """A thread after what is so now, and the notice that is due; what an anomaly stands for ends without
+    one."""
+    if now.is_explained(incident or thread.reported):
+        return replace(thread, reported=incident or thread.reported, is_over=True), []
     if incident is None or incident.cleared_at is not None:
         if thread.is_over:
             return thread, []

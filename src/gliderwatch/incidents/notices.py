@@ -35,7 +35,8 @@ class Situation:
 
     ``last`` is the last dive that ended with a fix, ``speeds`` those of the last dives (m/s, None where not
     known; oldest first), ``expected`` the next surfacing, ``others`` the other incidents that are open;
-    ``came_up`` why the glider came up then, as it said in its call.
+    ``came_up`` why the glider came up then, as it said in its call; ``health`` what rules of health found
+    that goes on.
     """
 
     last: Assessment | None = None
@@ -43,6 +44,7 @@ class Situation:
     expected: NextSurfacing | None = None
     others: tuple[Incident, ...] = ()
     came_up: str = ""
+    health: tuple[HealthIncident, ...] = ()
 
 
 NOTHING_ELSE = Situation()
@@ -380,6 +382,7 @@ class HealthOver:
     incident: HealthIncident
     is_withdrawn: bool
     fix: Fix | None
+    situation: Situation = NOTHING_ELSE
 
 
 # -------------------------------------------------------- the files of a glider

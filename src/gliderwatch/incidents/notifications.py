@@ -18,6 +18,7 @@ from gliderwatch.incidents.neighbours import Comparison
 from gliderwatch.incidents.notices import (
     Cleared,
     Corrected,
+    HealthIncident,
     NewRegime,
     Notice,
     Opened,
@@ -113,7 +114,8 @@ def due_notifications(
     latest, before_it = [*last_dives(facts, 2), None, None][:2]
     if latest is None:
         return notified, []
-    moment = _Moment(facts, latest, max(now, latest.t_surface), reminder_hours, acks)
+    health = tuple(t.reported for t in notified.health if not t.is_over)
+    moment = _Moment(facts, latest, max(now, latest.t_surface), reminder_hours, acks, health)
     threads, alerts, settles = _of_incidents(notified.threads, moment)
     renewed, more = _new_regime(notified.renewed, facts, latest)
     alerts += more
@@ -142,13 +144,15 @@ def settled_changes(
 
 @dataclass(frozen=True, slots=True)
 class _Moment:
-    """What decides on the messages that are due: the ``latest`` dive, the time ``now`` (s)."""
+    """What decides on the messages that are due: the ``latest`` dive, the time ``now`` (s), and what rules of
+    ``health`` found that goes on."""
 
     facts: IncidentFacts
     latest: Assessment
     now: float
     reminder_hours: float | None
     acks: Acks
+    health: tuple[HealthIncident, ...] = ()
 
 
 def _of_incidents(
@@ -303,17 +307,16 @@ def _opened(
         incident, incident.last, situation(moment.facts, incident.id), former[-1] if former else None
     )
     if incident.cleared_at is not None:
-        content = _cleared(incident, moment.facts, is_first=True)
+        content = _cleared(incident, moment, is_first=True)
     after, notices = _message(thread, content, moment)
     return replace(after, formerly=(*thread.formerly, *(i.id for i in former))), notices
 
 
-def _cleared(incident: Incident, facts: IncidentFacts, *, is_first: bool = False) -> Cleared:
-    """That an incident is over, with the dive that cleared it and the incidents that go on."""
-    dive = facts.last_surfacing(incident.cleared_at if incident.cleared_at is not None else float("inf"))
-    return Cleared(
-        incident, dive if dive is not None else incident.last, situation(facts, incident.id), is_first
-    )
+def _cleared(incident: Incident, moment: _Moment, *, is_first: bool = False) -> Cleared:
+    """That an incident is over, with the dive that cleared it and what goes on."""
+    end = incident.cleared_at if incident.cleared_at is not None else float("inf")
+    now = replace(situation(moment.facts, incident.id), health=moment.health)
+    return Cleared(incident, moment.facts.last_surfacing(end) or incident.last, now, is_first)
 
 
 def _continued(thread: Thread, now: Incident | None, moment: _Moment) -> tuple[Thread, list[Notice]]:
@@ -328,7 +331,7 @@ def _continued(thread: Thread, now: Incident | None, moment: _Moment) -> tuple[T
         after, notices = _message(thread, content, moment)
         return replace(after, withdrawn=True), notices
     if now.cleared_at is not None and thread.is_open:
-        return _message(thread, _cleared(now, facts), moment)
+        return _message(thread, _cleared(now, moment), moment)
     moved = now.since != thread.reported.since or now.cleared_at != thread.reported.cleared_at
     if moved or thread.withdrawn or _changed(thread.dive, dive):
         content = Corrected(thread.reported, now, dive, _why(thread, dive), situation(facts, now.id))

@@ -15,7 +15,7 @@ from gliderwatch.health.rule import Finding
 from gliderwatch.health.rules import RULES
 from gliderwatch.incidents.notices import HealthFound, HealthIncident, HealthOver, HealthReminder
 from gliderwatch.messages.formatting import clean, duration, short_place, utc
-from gliderwatch.messages.phrases import map_of, name_of, next_call, take_on_thread
+from gliderwatch.messages.phrases import map_of, name_of, next_call, still_open_ones, take_on_thread
 from gliderwatch.messages.template import Page, Text, sentence, titled
 from gliderwatch.model import Fix
 
@@ -109,8 +109,14 @@ def over(glider: str, content: HealthOver) -> Text:
     what = "was not so: data that came late show it" if content.is_withdrawn else "is over"
     title = _title(incident).lower()
     first = f"{name}: {title} {what}. It was reported {utc(incident.since)}: {incident.last.text}."
-    page = Page((first, _where(content.fix)), _numbers(incident, incident.last), do=("Nothing.",))
-    short = "was not so" if content.is_withdrawn else "is over"
+    short, others = "was not so" if content.is_withdrawn else "is over", still_open_ones(content.situation)
+    if others:
+        still = " and ".join(f"the {each} since {utc(since)}" for each, since in others)
+        first += f" But not all is well: {still} is still open."
+    todo = "Go on with what is still open." if others else "Nothing."
+    page = Page((first, _where(content.fix)), _numbers(incident, incident.last), do=(todo,))
+    if others:
+        return titled(glider, f"{others[0][0]} STILL OPEN", f", {title} {short}"), page
     return titled(glider, f"ALL CLEAR: {title} {short}"), page
 
 

@@ -39,6 +39,7 @@ from gliderwatch.messages.phrases import (
     name_of,
     next_call,
     speed_and_range,
+    still_open_ones,
     take_on,
     trend,
     where,
@@ -119,14 +120,15 @@ def _course(incident: Incident, latest: Assessment, now: Situation) -> str:
 
 def cleared(glider: str, content: Cleared) -> Text:
     """The all-clear of an incident, which says what goes on."""
-    incident, dive, others = content.incident, content.dive, content.situation.others
+    incident, dive = content.incident, content.dive
+    open_ones = still_open_ones(content.situation)
     name, over = name_of(glider), _name(incident)
     end = dive.t_surface if incident.cleared_at is None else incident.cleared_at
-    still = " and ".join(f"the {_name(other)} since {utc(other.since)}" for other in others)
+    still = " and ".join(f"the {what} since {utc(since)}" for what, since in open_ones)
     lasted = f"It lasted {duration(end - incident.since)}, since {utc(incident.since)}."
     if still:
         first = f"{name}: the {over} is over, but not all is well: {still} is still open. {lasted}"
-        title = titled(glider, f"{_name(others[0])} STILL OPEN", f", {over} over")
+        title = titled(glider, f"{open_ones[0][0]} STILL OPEN", f", {over} over")
     else:
         state = (
             "the measurements agree again" if incident.kind is Kind.FALSE_ALARM else "flies as usual again"

@@ -6,6 +6,7 @@ from gliderwatch.incidents.notices import Situation
 from gliderwatch.messages.causes import is_named
 from gliderwatch.messages.evidence import normal_range, number, out_of_range
 from gliderwatch.messages.formatting import (
+    INCIDENTS,
     UNKNOWN,
     clean,
     duration,
@@ -78,6 +79,12 @@ def map_of(lat: float | None, lon: float | None) -> Pairs:
     """The link to a map, where a place is known."""
     link = map_link(lat, lon)
     return (("Map", link),) if link else ()
+
+
+def still_open_ones(situation: Situation) -> list[tuple[str, float]]:
+    """What else is open, by its name, and since when (s)."""
+    dives = [(INCIDENTS[each.kind], each.since) for each in situation.others]
+    return [*dives, *((each.rule.replace("_", " "), each.since) for each in situation.health)]
 
 
 def take_on(incident: Incident, situation: Situation) -> Pairs:
