@@ -176,7 +176,7 @@ class TestPrior:
     def test_before_any_dive(self):
         state = kalman.init(JointParams(), 0.0)
         assert state.x[OWN] == 0.35
-        assert np.sqrt(np.diag(state.cov)[[OWN, SLIP, SIDE]]) == pytest.approx([0.2, 0.018, 0.03])
+        assert np.sqrt(np.diag(state.cov)[[OWN, SLIP, SIDE]]) == pytest.approx([0.2, 0.014, 0.03])
 
     def test_the_speed_wanders_by_1_5_cm_s_in_3_hours_and_slip_is_forgotten_in_a_month(self):
         params = JointParams()
