@@ -11,10 +11,10 @@ rad, and 6 mm/s at random. `fleet_faults.py`, which runs the installed program, 
 this is much faster.
 
 - flow: the error of the current of a dive (cm/s, a component, rms) as told by the others alone
-  (`fleet.flow.fleet_flow`), beside the mean of the glider's own currents so far, and its last one; by the
-  distance of the nearest; and NEES.
-- faults: from the fourth day on the first glider has a fault. Told: `cross_check` finds it at two surfacings
-  in a row within 48 h. False: that it finds one of another glider, or before.
+  (`fleet.reference`), and as fused with its own dives before, beside the mean of the glider's own currents so
+  far, and its last one; by the distance of the nearest; and NEES of both.
+- faults: from the fourth day on the first glider has a fault. Told: `fleet_reference` has it within 48 h. False:
+  that it has one of another glider, or before.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the workers are the thread
 import numpy as np
 from common import machine
 
-from gliderwatch.fleet.cross_check import Check, cross_check
-from gliderwatch.fleet.flow import DiveCurrent, fleet_flow
+from gliderwatch.fleet.flow import DiveCurrent
+from gliderwatch.fleet.reference import fleet_reference
 from gliderwatch.model import Array, Fix
 from gliderwatch.navigation.geodesy import heading_vectors
 from gliderwatch.simulate.flight import Point, offset
@@ -74,6 +74,8 @@ class Glider:
         self.heading, self.speed = heading + apart, speed * (1 + 0.04 * self.rng.standard_normal())
         self.slip = self.rng.uniform(0.0, 0.09)
         self.turn = float(np.clip(self.rng.normal(0, 0.03), -0.06, 0.06))
+        self.flows = dict[float, Array]()
+        """What is true: the mean flow of each dive, by its end (s)."""
 
     def errors(self, t: float) -> tuple[float, float]:
         """The part of its speed that it has not, and by how much its compass is off (rad), at a time (s)."""
@@ -103,6 +105,7 @@ class Glider:
             course=(float(course[0]), float(course[1])),
             speed=self.speed,
         )
+        self.flows[made.end.t] = flow
         if not self.job.one_way and np.hypot(*self.place) > ACROSS and self.place @ course > 0:
             self.heading = math.atan2(-self.place[0], -self.place[1]) + self.rng.uniform(-0.6, 0.6)
         return made
@@ -113,21 +116,23 @@ def _fix(t: float, place: Array, origin: Point) -> Fix:
     return Fix(t, float(lat), float(lon))
 
 
-def currents_of(job: Job) -> tuple[float, list[DiveCurrent]]:
-    """When a fleet begins (s), and the currents that it measures, in the order of its surfacings."""
+def currents_of(job: Job) -> tuple[float, list[DiveCurrent], dict[float, Array]]:
+    """When a fleet begins (s), the currents that it measures, in the order of its surfacings, and the true
+    flows of its first glider by the ends of its dives."""
     base = sea_mission(job.sea, job.seed, days=job.days)
     chance, rng = np.random.default_rng([job.seed, 17]), np.random.default_rng([job.seed, 3])
     end = base.start + (job.days + 1) * DAY
     ocean = make_ocean(base.sea, base.start - DAY, end, rng, lat=base.place.lat)
     heading, speed = chance.uniform(0, math.tau), chance.uniform(0.22, 0.38)
-    out = list[DiveCurrent]()
+    out, truth = list[DiveCurrent](), dict[float, Array]()
     for k in range(job.gliders):
         glider = Glider(job, k, heading, speed)
         t = glider.rng.uniform(0, DIVE)
         while t < job.days * DAY - DIVE:
             out.append(glider.dive(ocean, t, base.place, base.depths[1], base.start))
             t = out[-1].end.t - base.start + UP
-    return base.start, sorted(out, key=lambda each: each.end.t)
+        truth = truth or glider.flows
+    return base.start, sorted(out, key=lambda each: each.end.t), truth
 
 
 # --------------------------------------------------------------------------- flow
@@ -135,21 +140,23 @@ def currents_of(job: Job) -> tuple[float, list[DiveCurrent]]:
 
 def flow_errors(job: Job) -> list[tuple[float, ...]]:
     """Of each dive of the first glider from the third day on: distance of the nearest (m), squared errors a
-    component of the others, of the mean so far, of the last; squared error over variance of the first."""
-    start, currents = currents_of(job)
+    component of the others, of these fused with its own, of the mean so far, of the last; squared error over
+    variance of the first two."""
+    start, currents, truth = currents_of(job)
     own = [each for each in currents if each.glider == "g0"]
     out = []
     for k, dive in enumerate(own):
         if dive.end.t < start + 3 * DAY or k == 0:
             continue
-        found = fleet_flow([c for c in currents if c.end.t <= dive.end.t], "g0", dive.start, dive.end)
+        found = fleet_reference([c for c in currents if c.end.t <= dive.end.t], "g0")
         if found is None:
             continue
-        truth = np.array([dive.u, dive.v])
         past = np.array([[c.u, c.v] for c in own[:k]])
-        off = [truth - each for each in (found.flow, past.mean(axis=0), past[-1])]
-        nees = float(off[0] @ np.linalg.solve(found.cov + 0.02**2 * np.eye(2), off[0])) / 2
-        out.append((found.nearest, *(float(each @ each) / 2 for each in off), nees))
+        flows = (found.others.flow, found.fused[0], past.mean(axis=0), past[-1])
+        off = [truth[dive.end.t] - each for each in flows]
+        covs = (found.others.cov, found.fused[1])
+        nees = (float(e @ np.linalg.solve(cov, e)) / 2 for e, cov in zip(off, covs, strict=False))
+        out.append((found.others.nearest, *(float(each @ each) / 2 for each in off), *nees))
     return out
 
 
@@ -157,12 +164,13 @@ def flow_table(jobs: list[Job], workers: int) -> Iterator[str]:
     """Lines of the table of errors."""
     with ProcessPoolExecutor(workers) as pool:
         results = list(zip(jobs, pool.map(flow_errors, jobs), strict=True))
-    yield "                     dives  others  own mean  own last  NEES   (cm/s a component)"
+    yield "                     dives  others  fused  own mean  own last  NEES  fused   (cm/s a component)"
 
     def line(name: str, rows: Array) -> str:
-        errors = 100 * np.sqrt(rows[:, 1:4].mean(axis=0))
-        by = f"{errors[0]:6.1f}  {errors[1]:8.1f}  {errors[2]:8.1f}"
-        return f"{name:20} {len(rows):6d}  {by}  {rows[:, 4].mean():4.1f}"
+        a, b, c, d = 100 * np.sqrt(rows[:, 1:5].mean(axis=0))
+        nees = rows[:, 5:].mean(axis=0)
+        by = f"{a:6.1f}  {b:5.1f}  {c:8.1f}  {d:8.1f}"
+        return f"{name:20} {len(rows):6d}  {by}  {nees[0]:4.1f}  {nees[1]:5.1f}"
 
     for n in dict.fromkeys(job.gliders for job in jobs):
         yield line(
@@ -193,22 +201,21 @@ class Result:
 
 def told(job: Job) -> Result:
     """What comparisons at each surfacing of a fleet find."""
-    start, currents = currents_of(job)
+    start, currents, _ = currents_of(job)
     ill = start + job.onset * DAY if job.fault != "none" else math.inf
-    last, when, false = dict[str, str](), None, dict[str, str]()
+    when, false = None, dict[str, str]()
     for k, dive in enumerate(currents):
         if dive.end.t < start + 2 * DAY or dive.end.t > ill + TIME * HOUR:
             continue
-        check = cross_check(currents[: k + 1], dive.glider)
-        found = check.sure if isinstance(check, Check) else None
-        name = "" if found is None else f"{found.glider or 'all'}/{found.fault}"
-        if name and last.get(dive.glider) == name:
-            hours = (dive.end.t - start) / HOUR
-            if name == f"g0/{job.fault}" and dive.end.t > ill:
-                when = (dive.end.t - ill) / HOUR if when is None else when
-            else:
-                false.setdefault(name, f"{hours:.0f} h {name} {found.size:.2f} ({found.ratio:.0f})")
-        last[dive.glider] = name
+        reference = fleet_reference(currents[: k + 1], dive.glider)
+        found = None if reference is None else reference.fault
+        if found is None:
+            continue
+        name, hours = f"{found.glider or 'all'}/{found.fault}", (dive.end.t - start) / HOUR
+        if name == f"g0/{job.fault}" and dive.end.t > ill:
+            when = (dive.end.t - ill) / HOUR if when is None else when
+        else:
+            false.setdefault(name, f"{hours:.0f} h {name} {found.size:.2f} ({found.ratio:.0f})")
     return Result(job, when, tuple(false.values()), job.gliders * (job.days - 2) / 30)
 
 

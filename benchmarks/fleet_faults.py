@@ -1,7 +1,7 @@
 """Losses that a lone glider cannot show, and healthy fleets, in kinds of sea, through the installed program.
 
     python benchmarks/fleet_faults.py [--seas mixed rotary ...] [--gliders 1 2 4 8] [--faults wing_loss:0.4
-    compass:0.3 none] [--seeds 1] [--days 8] [--onset 4] [--workers 2] [--json out.json]
+    compass:0.3 none] [--seeds 1] [--first 0] [--days 6.5] [--onset 4] [--json out.json]
 
 A fleet flies within 50 km, each glider on one steady heading, and sends no roll. From the day `onset` on the
 first one has the fault. Files are written, `gliderwatch run --replay` takes them, and what it says of fault
@@ -13,10 +13,11 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
+import shutil
 import sys
 import tempfile
-from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from itertools import product
@@ -100,24 +101,38 @@ def _offset(place: Point, east: float, north: float) -> Point:
     return Point(float(lat), float(lon))
 
 
-def run(job: Job) -> Result:
-    """Simulate a fleet, replay its files, and see what is said."""
+def fly(folder: Path, scenario: Scenario) -> Path:
+    """The folder with the files of a mission and its caches; it is simulated once."""
+    fault = "-".join(f"{each.kind}-{each.size}" for each in scenario.faults) or "none"
+    made = folder / f"{scenario.glider}-{fault}"
+    if not made.exists():
+        mission = simulate(scenario)
+        write_mission(made / "gliders", made / "cache", mission)
+        write_cache(made / "cache", mission)
+    return made
+
+
+def run(jobs: Sequence[Job]) -> Iterator[Result]:
+    """Simulate fleets of one sea and seed, replay their files, and see what is said."""
     with tempfile.TemporaryDirectory(prefix="gliderwatch-benchmark-") as name:
-        folder = Path(name)
-        missions = fleet(job)
-        for scenario in missions:
-            mission = simulate(scenario)
-            write_mission(folder / "gliders", folder / "cache", mission)
-            write_cache(folder / "cache", mission)
-        config = folder / "gliderwatch.yml"
-        config.write_text(
-            f"dockserver: {{roots: [{folder / 'gliders'}], cache: [{folder / 'cache'}]}}\n"
-            f"state: {{path: {folder / 'state.sqlite'}}}\n"
-            "defaults: {neighbours: true}\n"
-            f"gliders: {{{', '.join(f'{m.glider}: {{}}' for m in missions)}}}\n"
-        )
-        cost("run", "-c", config, "--replay", folder / "gliders", "--out", folder / "out")
-        text = (folder / "out" / "alerts.jsonl").read_text(encoding="utf-8")
+        for k, job in enumerate(jobs):
+            missions = fleet(job)
+            made = [fly(Path(name), scenario) for scenario in missions]
+            yield _replayed(Path(name) / f"job-{k}", job, missions, made)
+
+
+def _replayed(folder: Path, job: Job, missions: Sequence[Scenario], made: Sequence[Path]) -> Result:
+    gliders, caches, config = folder / "gliders", folder / "cache", folder / "gliderwatch.yml"
+    for each in made:
+        shutil.copytree(each / "gliders", gliders, copy_function=os.link, dirs_exist_ok=True)
+        shutil.copytree(each / "cache", caches, dirs_exist_ok=True)
+    config.write_text(
+        f"dockserver: {{roots: [{gliders}], cache: [{caches}]}}\n"
+        f"state: {{path: {folder / 'state.sqlite'}}}\n"
+        f"gliders: {{{', '.join(f'{m.glider}: {{}}' for m in missions)}}}\n"
+    )
+    cost("run", "-c", config, "--replay", gliders, "--out", folder / "out")
+    text = (folder / "out" / "alerts.jsonl").read_text(encoding="utf-8")
     begins = missions[0].start + job.onset * DAY
     told, kind, false = None, "", list[str]()
     for line in map(json.loads, text.splitlines()):
@@ -152,25 +167,24 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--days", type=float, default=6.5)
     parser.add_argument("--onset", type=float, default=4.0)
-    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     faults = [fault.partition(":") for fault in options.faults]
-    jobs = [
-        Job(sea, n, fault, float(size or 0), seed, options.days, options.onset)
-        for (fault, _, size), n, sea, seed in product(
-            faults, options.gliders, options.seas, range(options.seeds)
-        )
-    ]  # fmt: skip
+    kinds = list(product(faults, options.gliders))
     print(machine())
     results = list[Result]()
-    with ProcessPoolExecutor(options.workers) as pool:
-        for result in pool.map(run, jobs):
+    for seed, sea in product(range(options.first, options.first + options.seeds), options.seas):
+        jobs = [
+            Job(sea, n, fault, float(size or 0), seed, options.days, options.onset)
+            for (fault, _, size), n in kinds
+        ]
+        for result in run(jobs):
             results.append(result)
-            print(f"{len(results)} of {len(jobs)}: {result}", file=sys.stderr)
+            print(f"{len(results)}: {result}", file=sys.stderr, flush=True)
+            if options.json:
+                options.json.write_text(json.dumps([asdict(each) for each in results]))
     table(results)
-    if options.json:
-        options.json.write_text(json.dumps([asdict(result) for result in results]))
 
 
 if __name__ == "__main__":

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from alert_support import DISAGREE, DIVE, HEALTHY, SLOW, SURFACE, incident
 from gliderwatch.estimation.modes import MODES
 from gliderwatch.estimation.verdict import FASTER, Blame
-from gliderwatch.fleet.cross_check import Fault, Hypothesis, Reference
+from gliderwatch.fleet.cross_check import Check, Hypothesis
+from gliderwatch.fleet.flow import DiveCurrent, Fault, FleetFlow
+from gliderwatch.fleet.reference import FleetReference
 from gliderwatch.health.rule import Finding
 from gliderwatch.incidents.notices import (
     Aborted,
@@ -145,6 +149,14 @@ CUT = replace(CALL, over=True, announced=("0308a3f2.sbd",))
 
 
 FIX = Fix(SURFACE - 240.0, 24.21, -83.01)
+_ERROR = 0.03**2 * np.eye(2)
+BESIDE = FleetReference(
+    DiveCurrent("electa", FIX, FIX, 0.02, -0.21),
+    FleetFlow(np.array([0.01, -0.09]), _ERROR, ("angus", "bruce"), 8e3),
+    (np.array([0.01, -0.09]), _ERROR),
+    Check(("angus", "bruce"), 8e3, None, None),
+    None,
+)
 _FOUND = Finding(
     "leak",
     Severity.CRITICAL,
@@ -235,7 +247,7 @@ def kinds() -> dict[str, Alert]:
                 ("angus", "bruce"),
                 8e3,
                 situation(HEALTHY),
-                Reference((0.02, -0.21), (0.01, -0.09), 0.03),
+                BESIDE,
             ),
         ),
         "neighbours-all": message(

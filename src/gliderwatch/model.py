@@ -306,6 +306,10 @@ class Flag(IntEnum):
     FALSE_ALARM = 2
 
 
+OTHER_REFERENCE = "reference flow:"
+"""How a note on a dive begins whose reference flow is not its own depth-averaged current."""
+
+
 @dataclass(frozen=True, slots=True)
 class Assessment:
     """What gliderwatch says of one dive. Fields: `docs/nomenclature.md`.

@@ -73,7 +73,7 @@ class GliderParams:
     speed_learnt: bool = True
     """Whether a range learnt from the first healthy dives takes the place of the two above."""
     estimator: Literal["joint", "adaptive"] = "joint"
-    reference: Literal["dac", "tides", "learnt", "model"] = "dac"
+    reference: Literal["dac", "fleet", "tides", "learnt", "model"] = "dac"
     """The flow F_M that the estimated one is compared with."""
     gamma_f: float = 0.3
     """Flow error p_E above which the flow does not fit (001 Algorithm 2)."""
@@ -102,7 +102,7 @@ class Attention:
     """Hours without a dive that could be judged after which that is told; None: hours do not count."""
     unknown_dives: int | None = 8
     """Dives in a row that could not be judged after which that is told; None: their number does not count."""
-    neighbours: bool = False
+    neighbours: bool = True
     """Whether it is compared with the gliders about it."""
 
     def is_quiet(self, now: float) -> bool:

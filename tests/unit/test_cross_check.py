@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from gliderwatch.fleet import flow
-from gliderwatch.fleet.cross_check import Check, Fault, cross_check, current_of
-from gliderwatch.fleet.flow import DiveCurrent
+from gliderwatch.fleet.cross_check import Check, cross_check, current_of
+from gliderwatch.fleet.flow import DiveCurrent, Fault, FlowCovariance, Sea, dives_between
+from gliderwatch.fleet.reference import fleet_reference
 from gliderwatch.messages.samples import SAMPLES
 from gliderwatch.model import Fix, Flag
 from gliderwatch.navigation.geodesy import from_plane
-from gliderwatch.sea.tides import Constituent
 
 T0, HOUR, W = 1.7e9, 3600.0, 0.3
-SEA = flow.FlowSizes(0.03, 0.1, 0.2, 0.05, (Constituent.M2, Constituent.S2, Constituent.K1))
+SEA = Sea(eddy=0.05, reach=20e3, gradient=0.05, inertial=0.05, noise=0.02)
 
 
 def fleet(n: int, seed: int) -> list[DiveCurrent]:
@@ -30,7 +30,8 @@ def fleet(n: int, seed: int) -> list[DiveCurrent]:
             )
             out.append(DiveCurrent(f"g{g}", start, end, 0.0, 0.0, course=tuple(course), speed=W))
             at, t = at + 900 * course, t + 3.2 * HOUR
-    cov = flow.currents_covariance(out, SEA)  # the noise of the currents is in it
+    dives = dives_between([(each.start, each.end) for each in out], out[0].start)
+    cov = FlowCovariance(dives, dives, 50.0).of(SEA) + flow.noise(out, SEA)
     drawn = (np.linalg.cholesky(cov) @ rng.normal(size=len(cov))).reshape(-1, 2)
     return [replace(each, u=float(u), v=float(v)) for each, (u, v) in zip(out, drawn, strict=True)]
 
@@ -88,7 +89,7 @@ def test_nobody_near_nothing_to_compare() -> None:
 def test_what_is_small_or_short_is_not_sure() -> None:
     found = cross_check(wrong(fleet(6, 4), Fault.LOSS, 0.4, "g2"), "g2")
     assert found.found is not None
-    for weaker in ({"size": 0.1}, {"ratio": 15.0}, {"dives": 3}):
+    for weaker in ({"size": 0.1}, {"ratio": 11.0}, {"dives": 3}):
         assert Check(found.neighbours, 1e3, replace(found.found, **weaker), None).sure is None
     assert Check(found.neighbours, 1e3, found.found, replace(found.found, glider="g1")).sure is None
 
@@ -117,13 +118,15 @@ def a_dive():
 
 def test_a_sure_fault_comes_with_what_the_others_measured() -> None:
     currents = wrong(healthy := fleet(6, 4), Fault.LOSS, 0.4, "g2")
-    check = cross_check(currents, "g2")
+    found = fleet_reference(currents, "g2")
+    assert found is not None and found.fault is not None
     last = [k for k, each in enumerate(currents) if each.glider == "g2"][-1]
-    assert check.reference is not None
-    assert check.reference.own == (currents[last].u, currents[last].v)
-    off = np.subtract(check.reference.flow, (healthy[last].u, healthy[last].v))
-    assert np.hypot(*off) < 3 * check.reference.sigma < 0.2
-    assert cross_check(healthy, "g2").reference is None
+    assert found.last == currents[last]
+    off, error = np.subtract(found.fused[0], (healthy[last].u, healthy[last].v)), found.fused[1]
+    assert off @ np.linalg.solve(error + 0.02**2 * np.eye(2), off) < 12
+    assert np.sqrt(np.trace(error)) < 0.1
+    well = fleet_reference(healthy, "g2")
+    assert well is not None and well.fault is None
 
 
 def test_a_front_is_no_fault() -> None:

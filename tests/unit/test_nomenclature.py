@@ -107,6 +107,7 @@ def test_values_of_the_joint_estimator() -> None:
 def keys_in_code() -> set[str]:
     """Names under which navigation and estimators put numbers into dictionaries, read from the source."""
     paths = [path for folder in ("navigation", "estimation") for path in (SOURCE / folder).glob("*.py")]
+    paths.append(SOURCE / "fleet" / "reference.py")
     trees = [ast.parse(path.read_text(encoding="utf-8")) for path in paths]
     functions = [
         node

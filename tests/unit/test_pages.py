@@ -183,7 +183,7 @@ def found(
             "warn",
         ),
         (
-            NotificationState(neighbours=Comparison(NOW, Fault.LOSS, 3, "electa/neighbours/1", NOW)),
+            NotificationState(neighbours=Comparison(NOW, Fault.LOSS, "electa/neighbours/1", NOW)),
             "NEIGHBOURS",
             "warn",
         ),

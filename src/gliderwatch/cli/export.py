@@ -26,6 +26,7 @@ from gliderwatch.errors import ConfigError, GliderwatchError
 
 if TYPE_CHECKING:
     from gliderwatch.config import Config
+    from gliderwatch.model import Assessment
     from gliderwatch.pages.view import GliderView
     from gliderwatch.store.state_file import Store
 
@@ -129,6 +130,7 @@ def export(
     csv: one row a dive. geojson, kml: for maps.
     """
     from gliderwatch.export import dives, maps
+    from gliderwatch.fleet.reference import beside_neighbours
 
     config = configuration(config_path, state)
     if out is not None:
@@ -144,7 +146,8 @@ def export(
             _write_netcdf(out, form, store, views[0], config.export.attributes if config is not None else {})
             return
         if form == "csv":
-            text = dives.as_csv([dive for view in views for dive in view.dives])
+            fleet = _fleet(store)
+            text = dives.as_csv([d for view in views for d in beside_neighbours(view.dives, fleet)])
         else:
             text = maps.as_geojson(views) if form == "geojson" else maps.as_kml(views)
     if out is None:
@@ -153,14 +156,21 @@ def export(
         out.write_text(text, encoding="utf-8")
 
 
+def _fleet(store: Store) -> list[list[Assessment]]:
+    """The dives of each glider."""
+    return [store.assessments(glider) for glider in store.gliders()]
+
+
 def _write_netcdf(
     out: Path, form: str, store: Store, view: GliderView, attributes: Mapping[str, str]
 ) -> None:
     from gliderwatch.export import netcdf, sections
+    from gliderwatch.fleet.reference import beside_neighbours
     from gliderwatch.pages import reading
 
     if form == "netcdf":
-        netcdf.write(out, view.name, view.dives, view.now, attributes)
+        dives = beside_neighbours(view.dives, _fleet(store))
+        netcdf.write(out, view.name, dives, view.now, attributes)
         return
     found, advice = reading.read_section(store, view.name, _ALL)
     sections.write(out, view.name, found, advice, view.dives, view.now, attributes)

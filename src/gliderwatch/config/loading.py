@@ -53,7 +53,7 @@ class Config(Section):
     """The whole file. Made by `gliderwatch.config.load`."""
 
     dockserver: Dockserver = Field(description="Where files arrive.")
-    ocean: Ocean = Field(default=Ocean(), description="An ocean model, for `reference: model`.")
+    ocean: Ocean = Field(default=Ocean(), description="An ocean model, for `reference: model` or `fleet`.")
     fields: dict[Name, FieldSetting] = Field(
         default_factory=dict, description="Fields that the gliders measure together."
     )

@@ -158,10 +158,11 @@ class Preset(Section):
         description="`joint`: speed, flow and their uncertainty from fixes, headings and currents; "
         "`adaptive`: the trajectory learner of the papers.",
     )
-    reference: Literal["dac", "tides", "learnt", "model"] = Field(
+    reference: Literal["dac", "fleet", "tides", "learnt", "model"] = Field(
         default=_G.reference,
         description="The flow that the estimated one is compared with: the glider's own depth-averaged "
-        "current, its forecast with tides, the flow learnt on the dives before, or `ocean.files`.",
+        "current (`dac`; `fleet`: the same, with `ocean.files` weighed into the flow by the fleet), its "
+        "forecast with tides, the flow learnt on the dives before, or `ocean.files` alone.",
     )
     detection: Detection = Field(default=Detection(), description="Detection.")
     adaptive: Adaptive = Field(default=Adaptive(), description="The trajectory learner.")
@@ -193,7 +194,7 @@ class Settings(Preset):
     neighbours: bool = Field(
         default=_A.neighbours,
         description="Compare its currents with those of the gliders within 60 km, and report what does not "
-        "fit. Off by default: at fronts healthy gliders got such messages (docs/fleet.md).",
+        "fit (docs/fleet.md).",
     )
 
     preset: str | None = Field(default=None, description="Name of a preset; keys given here win over it.")
@@ -337,7 +338,7 @@ class BoxSetting(Section):
 
 
 class Ocean(Section):
-    """Files of an ocean model or a radar (CF NetCDF), for gliders with `reference: model`."""
+    """Files of an ocean model or a radar (CF NetCDF), for gliders with `reference: model` or `fleet`."""
 
     files: tuple[AbsolutePath, ...] = Field(
         default=(), description="Paths or patterns (`/data/hycom/*.nc`); read again when they change."

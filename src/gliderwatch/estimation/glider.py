@@ -14,7 +14,15 @@ from gliderwatch.estimation.constants import APART, PROVISIONAL, REPORTED
 from gliderwatch.estimation.healthy_baseline import Baseline, evidence_of, learn
 from gliderwatch.estimation.kalman import JointEstimate, JointInfo, JointParams, expected_flow
 from gliderwatch.estimation.speed_range import RangeParams
-from gliderwatch.estimation.unassessed import Mean, Reference, of_learnt, of_model, of_tides, unassessed
+from gliderwatch.estimation.unassessed import (
+    Mean,
+    Reference,
+    model_numbers,
+    of_learnt,
+    of_model,
+    of_tides,
+    unassessed,
+)
 from gliderwatch.estimation.verdict import SpeedParams, SpeedState, Verdict
 from gliderwatch.estimation.verdict import step as step_speed
 from gliderwatch.model import Assessment, Current, Dive, Flag
@@ -165,7 +173,12 @@ def step(
         after = state if learnt is state.learner else replace(state, learner=learnt)
     if dive.track is None or dive.start is None or dive.end is None:
         return after, assessment
-    evidence = {**assessment.evidence, **evidence_of(state.baseline, dive.features)}
+    modelled = of_model(ocean, dive, dive.start, dive.end) if params.reference == "fleet" else None
+    evidence = {
+        **assessment.evidence,
+        **evidence_of(state.baseline, dive.features),
+        **({} if modelled is None else model_numbers(modelled)),
+    }
     after = _with_currents(after, dive, params, assessment.flag)
     if assessment.flag == Flag.NORMAL and not frozen:
         after = replace(after, baseline=learn(state.baseline, dive.features))
@@ -174,7 +187,7 @@ def step(
 
 def _reference(state: Estimate, dive: Dive, params: GliderParams, ocean: Field | None) -> Reference | None:
     """What a dive is compared with; None: its own current."""
-    if params.reference == "dac" or dive.start is None or dive.end is None:
+    if params.reference in ("dac", "fleet") or dive.start is None or dive.end is None:
         return None
     if params.reference == "model":
         return of_model(ocean, dive, dive.start, dive.end)

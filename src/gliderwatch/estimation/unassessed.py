@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gliderwatch.estimation.constants import MODEL_ERROR, SHALLOW
-from gliderwatch.model import Array, Assessment, Current, Dive, Fix
+from gliderwatch.model import OTHER_REFERENCE, Array, Assessment, Current, Dive, Fix
 from gliderwatch.navigation.features import evidence
 from gliderwatch.navigation.track import closure
 from gliderwatch.params import GliderParams
@@ -79,14 +79,14 @@ def of_tides(currents: Currents, start: Fix, end: Fix) -> Reference:
     found = predict(currents, start.t, end.t)
     if found is None:
         return _none("no forecast of the current yet")
-    return Reference(_current(found.flow), found.cov, (f"reference flow: {found.source}", *found.notes))
+    return Reference(_current(found.flow), found.cov, (f"{OTHER_REFERENCE} {found.source}", *found.notes))
 
 
 def of_learnt(flow: Mean | None) -> Reference:
     """What the estimator expected before the dive."""
     if flow is None:
         return _none("no flow learnt yet")
-    return Reference(_current(flow[0]), flow[1], ("reference flow: learnt on the dives before",))
+    return Reference(_current(flow[0]), flow[1], (f"{OTHER_REFERENCE} learnt on the dives before",))
 
 
 def of_model(ocean: Field | None, dive: Dive, start: Fix, end: Fix) -> Reference:
@@ -97,10 +97,18 @@ def of_model(ocean: Field | None, dive: Dive, start: Fix, end: Fix) -> Reference
     found = ocean.between(start, end, SHALLOW if depth is None else depth)
     if isinstance(found, str):
         return _none(found)
-    note = f"reference flow: {ocean.source}"
+    note = f"{OTHER_REFERENCE} {ocean.source}"
     if depth is None:
         note += f", mean of the upper {SHALLOW:.0f} m because the depth of the dive is not known"
     return Reference(_current(np.array(found)), MODEL_ERROR**2 * np.eye(2), (note,))
+
+
+def model_numbers(found: Reference) -> dict[str, float]:
+    """The flow of a model and its standard error (m/s), as evidence; empty where there is none."""
+    if found.current is None:
+        return {}
+    sigma = float(np.sqrt(np.trace(found.cov) / 2))
+    return {"model_u": found.current.u, "model_v": found.current.v, "model_sigma": sigma}
 
 
 def _none(why: str) -> Reference:

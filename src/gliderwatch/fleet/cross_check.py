@@ -15,9 +15,9 @@ kept: the same currents, in any order, give the same result.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,43 +25,46 @@ from gliderwatch.fleet.constants import (
     BETWEEN_DIVES,
     CHECK_WINDOW,
     CLEARER,
-    DAC_NOISE,
     DOUBTED_SPEED,
     LEAST_DIVES,
     LEAST_LOSS,
     LEAST_TURN,
     MOST_CURRENTS,
     MOST_DIVES,
+    MOST_LOSS,
     MOST_ONE_WAY,
     NEAR,
+    PROVISIONAL_DOUBT,
     SEA_EDDIES,
-    SEA_MEAN,
-    SEA_SCALES,
-    SEA_TIDE,
-    SEA_TIDE_GRADIENT,
+    SEA_GRADIENTS,
+    SEA_INERTIAL,
+    SEA_NOISES,
+    SEA_REACHES,
     SHARED_SURE,
     SURE,
-    USUAL_SLIP,
-    USUAL_TURN,
+    UNKNOWN_DOUBT,
 )
-from gliderwatch.fleet.flow import USUAL, DiveCurrent, FlowSizes, currents_covariance, fleet_flow
-from gliderwatch.model import Array, Assessment, Fix, Flag
+from gliderwatch.fleet.flow import (
+    DiveCurrent,
+    Fault,
+    FlowCovariance,
+    Sea,
+    dives_between,
+    effect,
+    healthy_errors,
+    noise,
+)
+from gliderwatch.model import OTHER_REFERENCE, Array, Assessment, Fix, Flag
 from gliderwatch.navigation.geodesy import to_plane
-from gliderwatch.sea.tides import Constituent
 
-_TIDES = (Constituent.M2, Constituent.S2, Constituent.N2, Constituent.K1, Constituent.O1)
-_SEAS = tuple(
-    FlowSizes(eddy, SEA_MEAN, SEA_TIDE, SEA_TIDE_GRADIENT, _TIDES, scale)
-    for scale in SEA_SCALES
-    for eddy in SEA_EDDIES
+_KINDS: tuple[tuple[dict[str, float], ...], ...] = (
+    tuple({"gradient": gradient} for gradient in SEA_GRADIENTS),
+    tuple({"eddy": eddy} for eddy in SEA_EDDIES),
+    tuple({"reach": reach} for reach in SEA_REACHES),
+    tuple({"inertial": inertial} for inertial in SEA_INERTIAL),
+    tuple({"noise": error} for error in SEA_NOISES),
 )
-
-
-class Fault(StrEnum):
-    """What the currents of a glider show."""
-
-    LOSS = "loss"
-    TURN = "turn"
+"""What of a sea is tried, one kind after the other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,18 +82,7 @@ class Hypothesis:
     size: float
     sigma: float
     ratio: float
-    sea: FlowSizes = USUAL
-
-
-@dataclass(frozen=True, slots=True)
-class Reference:
-    """What moved the water on the last dive of a glider: by its ``own`` current, and by the ``flow`` of the
-    others and of its own before the fault (m/s; east, north), with the standard error of that (m/s, a
-    component)."""
-
-    own: tuple[float, float]
-    flow: tuple[float, float]
-    sigma: float
+    sea: Sea = Sea()
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +91,7 @@ class Check:
 
     ``found`` is the likeliest fault of it (None: none is likely), ``others`` the likeliest of another glider,
     ``common`` the likeliest that all have alike (its ``glider`` is empty); ``one_way`` is the length of their
-    mean course, ``reference`` what a fault of it that is sure is seen by.
+    mean course, ``sea`` the one that suits the currents best where nothing is wrong.
     """
 
     neighbours: tuple[str, ...]
@@ -108,7 +100,7 @@ class Check:
     others: Hypothesis | None
     common: Hypothesis | None = None
     one_way: float = 0.0
-    reference: Reference | None = None
+    sea: Sea = Sea()
 
     @property
     def sure(self) -> Hypothesis | None:
@@ -117,9 +109,17 @@ class Check:
         own, other, common = (
             h.ratio if h is not None else 0.0 for h in (self.found, self.others, self.common)
         )
+        if self.one_way > MOST_ONE_WAY:
+            common = 0.0  # on one course it is a current, of which the sea has as much as it likes
         if common > max(own, other) + CLEARER:
-            return self.common if self.one_way < MOST_ONE_WAY and _is_large(self.common) else None
+            return self.common if _is_large(self.common) else None
         return self.found if own > max(other, common) + CLEARER and _is_large(self.found) else None
+
+    @property
+    def doubted(self) -> Hypothesis | None:
+        """A fault of another glider that is more likely than not."""
+        own, other = (h.ratio if h is not None else 0.0 for h in (self.found, self.others))
+        return self.others if other > own and _is_large(self.others) else None
 
 
 def _is_large(found: Hypothesis | None) -> bool:
@@ -143,28 +143,18 @@ def cross_check(currents: Sequence[DiveCurrent], glider: str) -> Check | None:
     neighbours = tuple(sorted({each.glider for each in chosen} - {glider}))
     if not neighbours:
         return None
-    found = list(_hypotheses(chosen))
     nearest = min(_distance(each, last) for each in chosen if each.glider != glider)
-    check = Check(
+    seas = _Seas(chosen)
+    tried = list(_candidates(chosen))
+    return Check(
         neighbours,
         nearest,
-        _likeliest(each for each in found if each.glider == glider),
-        _likeliest(each for each in found if each.glider not in ("", glider)),
-        _likeliest(each for each in found if not each.glider),
+        seas.likeliest([each for each in tried if each.glider == glider]),
+        seas.likeliest([each for each in tried if each.glider not in ("", glider)]),
+        seas.likeliest([each for each in tried if not each.glider]),
         float(np.hypot(*np.mean([each.course for each in chosen], axis=0))),
+        seas.usual,
     )
-    return check if check.sure is None else replace(check, reference=_reference(chosen, last, check.sure))
-
-
-def _reference(currents: Sequence[DiveCurrent], last: DiveCurrent, found: Hypothesis) -> Reference | None:
-    """What a fault of a glider is seen by on its last dive; None where it is not of one glider."""
-    if found.glider != last.glider:
-        return None
-    flow = fleet_flow(currents, last.glider, last.start, last.end, found.sea, found.since)
-    if flow is None:
-        return None
-    u, v = flow.flow.tolist()
-    return Reference((last.u, last.v), (u, v), math.sqrt(float(np.trace(flow.cov)) / 2))
 
 
 def current_of(dive: Assessment, before: Assessment | None) -> DiveCurrent | None:
@@ -175,6 +165,8 @@ def current_of(dive: Assessment, before: Assessment | None) -> DiveCurrent | Non
     known = dive.lat is not None and dive.lon is not None
     if not known or dive.reference_u is None or dive.reference_v is None or dive.flag == Flag.FALSE_ALARM:
         return None
+    if any(note.startswith(OTHER_REFERENCE) for note in dive.notes):
+        return None  # what it is compared with is not what it measured
     assert dive.lat is not None and dive.lon is not None
     end = start = Fix(dive.t_surface, dive.lat, dive.lon)
     if before is not None and before.lat is not None and before.lon is not None:
@@ -189,77 +181,120 @@ def current_of(dive: Assessment, before: Assessment | None) -> DiveCurrent | Non
         end,
         dive.reference_u,
         dive.reference_v,
-        DAC_NOISE if dive.reference_final else 2 * DAC_NOISE,
+        _doubt_of(dive),
         (steady * math.sin(mean), steady * math.cos(mean)),
         DOUBTED_SPEED if dive.flag == Flag.ANOMALY else 0.0,
         numbers.get("own_speed", 0.0) if steady > 0 else 0.0,
     )
 
 
-def _hypotheses(currents: Sequence[DiveCurrent]) -> Iterator[Hypothesis]:
-    """For each glider, fault and first dive with it, how likely that is."""
-    measured = np.array([[each.u, each.v] for each in currents]).ravel()
-    tried = list(_candidates(currents))
-    if not tried:
-        return
-    from scipy.linalg import cho_factor, cho_solve  # noqa: PLC0415 (slow; every command loads this module)
-
-    shapes = np.array([shape for *_, shape in tried]).T
-    plain, likelihoods, sizes, sigmas = -math.inf, [], [], []
-    healthy = _healthy_errors(currents)
-    for sea in _SEAS:
-        factor = cho_factor(currents_covariance(currents, sea) + healthy, lower=True)
-        weighed = cho_solve(factor, np.column_stack([measured, shapes]))
-        none = -0.5 * float(measured @ weighed[:, 0]) - float(np.log(np.diag(factor[0])).sum())
-        info = np.maximum(np.einsum("ij,ij->j", shapes, weighed[:, 1:]), 1e-9)
-        score = measured @ weighed[:, 1:]
-        plain = max(plain, none)
-        likelihoods.append(none + 0.5 * score**2 / info)
-        sizes.append(score / info)
-        sigmas.append(info**-0.5)
-    best = np.argmax(likelihoods, axis=0)
-    for k, (glider, fault, since, dives, _) in enumerate(tried):
-        sea, size = _SEAS[best[k]], float(sizes[best[k]][k])
-        ratio = 2 * (float(likelihoods[best[k]][k]) - plain)
-        if fault is Fault.LOSS and not 0 < size < 1.2:
-            continue  # faster than it reckons, or backwards: no loss does that
-        yield Hypothesis(glider, fault, since, dives, size, float(sigmas[best[k]][k]), ratio, sea)
+def _doubt_of(dive: Assessment) -> float:
+    """The factor on the error of the current of a dive: it is provisional, or nothing could be said of it."""
+    if dive.flag is None:
+        return UNKNOWN_DOUBT
+    return 1.0 if dive.reference_final else PROVISIONAL_DOUBT
 
 
-def _candidates(currents: Sequence[DiveCurrent]) -> Iterator[tuple[str, Fault, float, int, Array]]:
-    """What may have happened: glider, fault, since (s), dives since, and what one unit of it does to all
-    currents."""
+class _Candidate(NamedTuple):
+    """What may have happened: a ``fault`` of a glider (empty: of all) ``since`` then (s), ``dives`` ago;
+    ``shape`` is what one unit of it does to all currents ((2 n,))."""
+
+    glider: str
+    fault: Fault
+    since: float
+    dives: int
+    shape: Array
+
+
+def _candidates(currents: Sequence[DiveCurrent]) -> Iterator[_Candidate]:
     for glider in dict.fromkeys(each.glider for each in currents):
         rows = [k for k, each in enumerate(currents) if each.glider == glider and each.speed > 0]
         for n in range(1, min(len(rows), MOST_DIVES) + 1):
             for fault in Fault:
                 shape = np.zeros(2 * len(currents))
                 for k in rows[-n:]:
-                    shape[2 * k : 2 * k + 2] = _effect(currents[k], fault)
-                yield glider, fault, currents[rows[-n]].start.t, n, shape
+                    shape[2 * k : 2 * k + 2] = effect(currents[k], fault)
+                yield _Candidate(glider, fault, currents[rows[-n]].start.t, n, shape)
     for fault in Fault:
-        parts = [_effect(each, fault) for each in currents]
-        yield "", fault, currents[0].start.t, len(currents), np.concatenate(parts)
+        parts = [effect(each, fault) for each in currents]
+        yield _Candidate("", fault, currents[0].start.t, len(currents), np.concatenate(parts))
 
 
-def _healthy_errors(currents: Sequence[DiveCurrent]) -> Array:
-    """Covariance of what is off in the currents of each healthy glider all the time."""
-    out = np.zeros((2 * len(currents), 2 * len(currents)))
-    for fault, usual in ((Fault.LOSS, USUAL_SLIP), (Fault.TURN, USUAL_TURN)):
-        effects = np.concatenate([_effect(each, fault) for each in currents])
-        names = np.repeat([each.glider for each in currents], 2)
-        out += usual**2 * np.outer(effects, effects) * (names[:, None] == names)
-    return out
+class _Fit(NamedTuple):
+    """How likely currents are in a sea: ``none`` without a fault (log likelihood), ``better`` with each of
+    some, of the likeliest ``size`` with its standard error ``sigma``: (k,) each."""
+
+    none: float
+    better: Array
+    size: Array
+    sigma: Array
 
 
-def _effect(current: DiveCurrent, fault: Fault) -> Array:
-    """What one unit of a fault does to a current."""
-    east, north = current.course
-    return current.speed * np.array((-east, -north) if fault is Fault.LOSS else (-north, east))
+class _Seas:
+    """How likely some currents are in each sea, with a fault and without; ``usual``: likeliest without."""
+
+    def __init__(self, currents: Sequence[DiveCurrent]) -> None:
+        origin = currents[-1].end
+        dives = dives_between([(each.start, each.end) for each in currents], origin)
+        self._currents, self._healthy = currents, healthy_errors(currents)
+        self._covariance = FlowCovariance(dives, dives, origin.lat)
+        self._measured = np.array([[each.u, each.v] for each in currents]).ravel()
+        self._factors = dict[Sea, tuple[Array, bool]]()
+        self.usual = _climb(Sea(), lambda sea: self._fit(sea, []).none)
+        self._plain = self._fit(self.usual, []).none
+
+    def likeliest(self, tried: Sequence[_Candidate]) -> Hypothesis | None:
+        """The likeliest of some faults, in the sea that suits it; None where none can be."""
+        first = self._best(self.usual, tried)
+        if first is None:
+            return None
+        sea = _climb(self.usual, lambda each: float(self._fit(each, [tried[first]]).better[0]))
+        at = self._best(sea, tried)
+        if at is None:
+            return None
+        fit, each = self._fit(sea, [tried[at]]), tried[at]
+        ratio = 2 * (float(fit.better[0]) - self._plain)
+        size, sigma = float(fit.size[0]), float(fit.sigma[0])
+        return Hypothesis(each.glider, each.fault, each.since, each.dives, size, sigma, ratio, sea)
+
+    def _best(self, sea: Sea, tried: Sequence[_Candidate]) -> int | None:
+        """The place of the likeliest fault in a sea."""
+        fit = self._fit(sea, tried)
+        # a loss that makes it faster than it reckons, or lets it go backwards, is none
+        loss = np.array([each.fault is Fault.LOSS for each in tried], dtype=bool)
+        better = np.where(loss & ~((fit.size > 0) & (fit.size < MOST_LOSS)), -np.inf, fit.better)
+        if not len(better) or not np.isfinite(better.max()):
+            return None
+        return int(np.argmax(better))
+
+    def _fit(self, sea: Sea, tried: Sequence[_Candidate]) -> _Fit:
+        from scipy.linalg import cho_factor, cho_solve  # noqa: PLC0415 (slow; every command loads this module)
+
+        if sea not in self._factors:
+            errors = noise(self._currents, sea) + self._healthy
+            self._factors[sea] = cho_factor(self._covariance.of(sea) + errors, lower=True, check_finite=False)
+        factor = self._factors[sea]
+        shapes = np.array([each.shape for each in tried]).reshape(-1, len(self._measured))
+        weighed = cho_solve(factor, np.column_stack([self._measured, shapes.T]), check_finite=False)
+        none = -0.5 * float(self._measured @ weighed[:, 0]) - float(np.log(np.diag(factor[0])).sum())
+        info = np.maximum(np.einsum("ij,ji->i", shapes, weighed[:, 1:]), 1e-9)
+        score = self._measured @ weighed[:, 1:]
+        return _Fit(none, none + 0.5 * score**2 / info, score / info, info**-0.5)
 
 
-def _likeliest(found: Iterable[Hypothesis]) -> Hypothesis | None:
-    return max(found, key=lambda each: each.ratio, default=None)
+def _climb(sea: Sea, likelihood: Callable[[Sea], float]) -> Sea:
+    """The likeliest sea, by one kind of number after the other until none makes it likelier."""
+    best = likelihood(sea)
+    for _ in range(len(_KINDS)):
+        before = sea
+        for kind in _KINDS:
+            for numbers in kind:
+                other = replace(sea, **numbers)
+                if other != sea and (found := likelihood(other)) > best:
+                    sea, best = other, found
+        if sea == before:
+            break
+    return sea
 
 
 def _is_near(each: DiveCurrent, last: DiveCurrent) -> bool:

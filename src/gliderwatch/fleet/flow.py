@@ -1,16 +1,11 @@
 """The flow at a glider from the depth-averaged currents of the gliders about it. Pure.
 
-What one glider cannot know: a reference for its flow that knows nothing of its own dead reckoning. The flow
-is
-
-- eddies: a streamfunction of Gaussians, u = -sqrt(V) dpsi/dy, v = sqrt(V) dpsi/dx, so that no water comes
-  from nowhere; and a mean flow. Both forget (Ornstein-Uhlenbeck);
-- tides M2 and K1: cosine and sine parts, each u and v a plane in space.
-
-A depth-averaged current is the mean of that along its dive. With the basis ``H`` of each current and of the
-dive in question, the flow there given the currents is a Gaussian regression: the same as a Kalman filter and
-smoother over all of them, whatever order they came in. So there is no state: currents are an input, and the
-dive's own glider is left out of them.
+What one glider cannot know: a reference for its flow that knows nothing of its own dead reckoning. All
+currents of a fleet are one Gaussian vector (`Sea`): eddies that turn and forget, a mean flow, tides that
+differ in space, near-inertial motion. That is the basis of `papers.fleet_flow` with its Gaussians infinitely
+dense, which leaves a covariance in closed form. The flow on a dive given the currents is then a regression:
+the same as a Kalman filter and smoother over all of them, whatever order they came in. So there is no state:
+currents are an input, and the dive's own glider is left out of them.
 """
 
 from __future__ import annotations
@@ -18,68 +13,58 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
 
 import numpy as np
 
 from gliderwatch.fleet.constants import (
     DAC_NOISE,
-    EDDY,
-    FLOW_MEMORY,
     FLOW_SCALE,
     FLOW_WINDOW,
-    GRID,
-    MEAN_FLOW,
+    INERTIAL_MEMORY,
+    INERTIAL_REACH,
     MOST_CURRENTS,
     NEAR,
-    SPREAD,
-    TIDE,
-    TIDE_GRADIENT,
+    SEA_MEAN,
+    SEA_MEMORY,
+    SEA_TIDE,
+    SMALL,
+    SMALL_REACH,
+    USUAL_SLIP,
+    USUAL_TURN,
 )
 from gliderwatch.model import Array, Fix, readonly
 from gliderwatch.navigation.geodesy import to_plane
+from gliderwatch.sea.gauss_markov import EARTH
 from gliderwatch.sea.tides import Constituent
 
-TIDES = (Constituent.M2, Constituent.K1)
-Places = Sequence[tuple[Fix, Fix]]
-"""Dives by the fixes before and after them."""
-_ALONG = np.array([-math.sqrt(0.6), 0.0, math.sqrt(0.6)]) / 2 + 0.5
-_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18
-"""Gauss-Legendre points and weights on a dive: exact to 1e-5 for M2 over 6 h."""
+TIDES = (Constituent.M2, Constituent.S2, Constituent.N2, Constituent.K1, Constituent.O1)
 
 
 @dataclass(frozen=True, slots=True)
-class FlowSizes:
+class Sea:
     """Usual sizes (m/s, a component) of the parts of the flow.
 
-    ``eddy`` of one Gaussian, ``mean`` of what is the same everywhere, ``tide`` of a cosine or sine part, and
-    by how much that differs over `FLOW_SCALE` (``gradient``), of each of the ``tides``. An eddy has a
-    spread of sqrt(SPREAD) of the ``scale`` (m).
+    ``eddy`` of eddies, which are alike within the ``reach`` (m); ``gradient`` by how much a part of a tide
+    differs over `FLOW_SCALE`; ``inertial`` of near-inertial motion. ``noise`` is the error of the
+    depth-averaged current of a healthy glider on one dive.
     """
 
-    eddy: float = EDDY
-    mean: float = MEAN_FLOW
-    tide: float = TIDE
-    gradient: float = TIDE_GRADIENT
-    tides: tuple[Constituent, ...] = TIDES
-    scale: float = FLOW_SCALE
-
-    def deviations(self, eddies: int) -> Array:
-        """Those of all coefficients, the eddies' first."""
-        gradient = self.gradient * self.scale / FLOW_SCALE
-        plane = [self.tide, gradient, gradient]
-        return np.array([self.eddy] * eddies + [self.mean] * 2 + plane * (4 * len(self.tides)))
-
-
-USUAL = FlowSizes()
+    eddy: float = 0.06
+    reach: float = 20e3
+    gradient: float = 0.06
+    inertial: float = 0.03
+    noise: float = DAC_NOISE
 
 
 @dataclass(frozen=True, slots=True)
 class DiveCurrent:
     """The depth-averaged current of a dive between two fixes: ``u``, ``v`` (m/s, true north).
 
-    ``noise`` (m/s) is its error in each component; ``course`` (unit vector east, north; zeros: none) that of
-    the glider through the water, ``speed`` (m/s) what it takes for its own, and ``doubt`` (m/s) the error
-    along the course where that is not sure.
+    ``doubt`` is the factor on its usual error; ``course`` (unit vector east, north; zeros: none) that of the
+    glider through the water, ``speed`` (m/s) what it takes for its own, and ``along`` (m/s) the error along
+    the course where that is not sure.
     """
 
     glider: str
@@ -87,10 +72,17 @@ class DiveCurrent:
     end: Fix
     u: float
     v: float
-    noise: float = DAC_NOISE
+    doubt: float = 1.0
     course: tuple[float, float] = (0.0, 0.0)
-    doubt: float = 0.0
+    along: float = 0.0
     speed: float = 0.0
+
+
+class Fault(StrEnum):
+    """What may be wrong with a glider that takes what it loses for a current."""
+
+    LOSS = "loss"
+    TURN = "turn"
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,23 +98,131 @@ class FleetFlow:
     nearest: float
 
 
-def basis(
-    place: Array, t: Array, centres: Array, tides: Sequence[Constituent] = TIDES
-) -> tuple[Array, Array]:
-    """Rows of u and v ((n, L) each) at places ((n, 2), in units of `FLOW_SCALE`) and times (s, (n,)).
+# ----------------------------------------
+# The covariance of the flow on dives.
 
-    First the streamfunction's Gaussians about ``centres`` ((m, 2)), then the mean u and v, then of each tide
-    cosine and sine of u at 1, x - 1/2, y - 1/2, and of v. All but the first are of coefficients of unit size.
-    """
-    away = place[:, None, :] - centres
-    psi = np.exp(-np.square(away).sum(-1) / (2 * SPREAD)) / math.sqrt(SPREAD)
-    plane = np.column_stack([np.ones(len(place)), place - 0.5])
-    waves = [wave(each.omega * t) for each in tides for wave in (np.cos, np.sin)]
-    tide = np.hstack([wave[:, None] * plane for wave in waves])
-    none, ones, still = np.zeros_like(tide), np.ones((len(place), 1)), np.zeros((len(place), 1))
-    u = np.hstack([psi * away[..., 1], ones, still, tide, none])
-    v = np.hstack([-psi * away[..., 0], still, ones, none, tide])
-    return u, v
+
+@dataclass(frozen=True, slots=True)
+class Dives:
+    """Dives between fixes: their ``middle`` ((n, 2), m east and north of the origin), its time ``t`` (s,
+    after that of the origin) and how long they ``took`` (s)."""
+
+    middle: Array
+    t: Array
+    took: Array
+
+
+def dives_between(places: Sequence[tuple[Fix, Fix]], origin: Fix) -> Dives:
+    """Dives by the fixes before and after them."""
+    a, b = _plane([each[0] for each in places], origin), _plane([each[1] for each in places], origin)
+    t0, t1 = (np.array([each[k].t for each in places]) - origin.t for k in range(2))
+    return Dives((a + b) / 2, (t0 + t1) / 2, t1 - t0)
+
+
+class FlowCovariance:
+    """Covariance of the mean flow on two sets of dives at a latitude (degrees), in any sea."""
+
+    def __init__(self, a: Dives, b: Dives, lat: float) -> None:
+        self._a, self._b = a, b
+        self._frequency = 2 * EARTH * math.sin(math.radians(lat))
+        self._apart = a.middle[:, None] - b.middle
+        self._later = a.t[:, None] - b.t
+        self._square = np.square(self._apart).sum(-1)
+        self._eddies = dict[float, Array]()
+
+    def of(self, sea: Sea) -> Array:
+        """The covariance (m2/s2, (2 n, 2 m): u, v of each in turn)."""
+        if sea.reach not in self._eddies:
+            self._eddies[sea.reach] = self._turning(sea.reach)
+        tides = SEA_TIDE**2 + sea.gradient**2 * self._uneven
+        out = sea.eddy**2 * self._eddies[sea.reach] + sea.inertial**2 * self._inertial
+        same = SEA_MEAN**2 + tides * self._waves + SMALL**2 * self._small
+        out[::2, ::2] += same
+        out[1::2, 1::2] += same
+        return np.asarray(out)
+
+    def _turning(self, reach: float) -> Array:
+        """Eddies of unit size: those of a streamfunction, so that no water comes from nowhere."""
+        x, y = self._apart[..., 0] / reach, self._apart[..., 1] / reach
+        alike = np.exp(-self._square / (2 * reach**2) - np.abs(self._later) / SEA_MEMORY)
+        both = alike * x * y
+        return _woven(alike * (1 - y**2), both, both, alike * (1 - x**2))
+
+    @cached_property
+    def _small(self) -> Array:
+        """What is too small for two gliders to meet, of unit size."""
+        near = np.exp(-self._square / (2 * SMALL_REACH**2) - np.abs(self._later) / SEA_MEMORY)
+        return np.asarray(near)
+
+    @cached_property
+    def _inertial(self) -> Array:
+        """Near-inertial motion of unit size: it turns clockwise in the north, and forgets."""
+        means = [np.sinc(self._frequency * each.took / (2 * np.pi)) for each in (self._a, self._b)]
+        alike = np.outer(*means) * np.exp(
+            -self._square / (2 * INERTIAL_REACH**2) - np.abs(self._later) / INERTIAL_MEMORY
+        )
+        angle = self._frequency * self._later
+        c, s = alike * np.cos(angle), alike * np.sin(angle)
+        return _woven(c, s, -s, c)
+
+    @cached_property
+    def _waves(self) -> Array:
+        """Tides of unit size: the sum over all of them, averaged along the dives."""
+        out = np.zeros_like(self._later)
+        for each in TIDES:
+            means = [np.sinc(each.omega * dives.took / (2 * np.pi)) for dives in (self._a, self._b)]
+            out += np.outer(*means) * np.cos(each.omega * self._later)
+        return out
+
+    @cached_property
+    def _uneven(self) -> Array:
+        """By how much tides differ from the origin's, in squares."""
+        return np.asarray(self._a.middle @ self._b.middle.T / FLOW_SCALE**2)
+
+
+def _woven(uu: Array, uv: Array, vu: Array, vv: Array) -> Array:
+    """Four blocks (n, m) as one ((2 n, 2 m)), u and v of each dive in turn."""
+    out = np.empty((2 * uu.shape[0], 2 * uu.shape[1]))
+    out[::2, ::2], out[::2, 1::2], out[1::2, ::2], out[1::2, 1::2] = uu, uv, vu, vv
+    return out
+
+
+# ----------------------------------------
+# What is wrong in currents.
+
+
+def noise(currents: Sequence[DiveCurrent], sea: Sea) -> Array:
+    """Covariance of the errors of currents on single dives (m2/s2, (2 n, 2 n))."""
+    n = len(currents)
+    courses = np.array([each.course for each in currents])
+    out = np.zeros((n, 2, n, 2))
+    at = np.arange(n)
+    usual = np.square([sea.noise * each.doubt for each in currents])
+    along = np.square([each.along for each in currents])
+    out[at, :, at, :] = usual[:, None, None] * np.eye(2)
+    out[at, :, at, :] += along[:, None, None] * courses[:, :, None] * courses[:, None, :]
+    return out.reshape(2 * n, 2 * n)
+
+
+def effect(current: DiveCurrent, fault: Fault) -> Array:
+    """What one unit of a fault does to a current (m/s, (2,))."""
+    east, north = current.course
+    return current.speed * np.array((-east, -north) if fault is Fault.LOSS else (-north, east))
+
+
+def healthy_errors(currents: Sequence[DiveCurrent]) -> Array:
+    """Covariance of what is off in the currents of each healthy glider all the time (m2/s2, (2 n, 2 n))."""
+    out = np.zeros((2 * len(currents), 2 * len(currents)))
+    names = np.repeat([each.glider for each in currents], 2)
+    same = names[:, None] == names
+    for fault, usual in ((Fault.LOSS, USUAL_SLIP), (Fault.TURN, USUAL_TURN)):
+        effects = np.concatenate([effect(each, fault) for each in currents])
+        out += usual**2 * np.outer(effects, effects) * same
+    return out
+
+
+# ----------------------------------------
+# The flow on a dive.
 
 
 def fleet_flow(
@@ -130,7 +230,7 @@ def fleet_flow(
     glider: str,
     start: Fix,
     end: Fix,
-    sizes: FlowSizes = USUAL,
+    sea: Sea,
     until: float = -math.inf,
 ) -> FleetFlow | None:
     """The mean flow at a dive of ``glider`` between two fixes, from the ``currents`` of others near it.
@@ -139,41 +239,32 @@ def fleet_flow(
     matter. Its own that ended ``until`` then (s) count as well: what it expects by itself and what the others
     measured are weighed by their covariance.
     """
-    others = _near(currents, glider, start, end, until)
-    if all(each.glider == glider for each in others):
+    chosen = _near(currents, glider, start, end, until)
+    if all(each.glider == glider for each in chosen):
         return None
-    from scipy.linalg import cho_factor, cho_solve  # noqa: PLC0415 (slow; every command loads this module)
-
-    dives = [(each.start, each.end) for each in others]
-    centres = _centres([start, end, *(fix for dive in dives for fix in dive)], start, sizes.scale)
-    own, own_t = _rows([(start, end)], start, centres, sizes)
-    seen, seen_t = _rows(dives, start, centres, sizes)
-    fading = len(centres) + 2
-    cross = _covariance(own, own_t, seen, seen_t, fading)
-    matrix = _covariance(seen, seen_t, seen, seen_t, fading) + _noise(others)
-    gain = cho_solve(cho_factor(matrix, lower=True), cross.T).T
-    measured = np.array([[each.u, each.v] for each in others]).ravel()
-    cov = _covariance(own, own_t, own, own_t, fading) - gain @ cross.T
+    flow, cov = _regression(chosen, start, end, sea)
     middle = _middle(start, end, start)
     distances = (
-        np.hypot(*(_middle(each.start, each.end, start) - middle)) for each in others if each.glider != glider
+        np.hypot(*(_middle(each.start, each.end, start) - middle)) for each in chosen if each.glider != glider
     )
     return FleetFlow(
-        readonly(gain @ measured),
-        readonly((cov + cov.T) / 2),
-        tuple(sorted({each.glider for each in others} - {glider})),
-        float(min(distances)),
+        flow, cov, tuple(sorted({each.glider for each in chosen} - {glider})), float(min(distances))
     )
 
 
-def currents_covariance(currents: Sequence[DiveCurrent], sizes: FlowSizes) -> Array:
-    """Covariance (m2/s2, (2 n, 2 n): u, v of each in turn) of depth-averaged currents, their noise
-    included."""
-    dives = [(each.start, each.end) for each in currents]
-    origin = dives[-1][0]
-    centres = _centres([fix for dive in dives for fix in dive], origin, sizes.scale)
-    rows, t = _rows(dives, origin, centres, sizes)
-    return _covariance(rows, t, rows, t, len(centres) + 2) + _noise(currents)
+def _regression(currents: Sequence[DiveCurrent], start: Fix, end: Fix, sea: Sea) -> tuple[Array, Array]:
+    """The mean flow on a dive between two fixes and its covariance, given some currents."""
+    from scipy.linalg import cho_factor, cho_solve  # noqa: PLC0415 (slow; every command loads this module)
+
+    own = dives_between([(start, end)], start)
+    seen = dives_between([(each.start, each.end) for each in currents], start)
+    cross = FlowCovariance(own, seen, start.lat).of(sea)
+    errors = noise(currents, sea) + healthy_errors(currents)
+    factor = cho_factor(FlowCovariance(seen, seen, start.lat).of(sea) + errors, lower=True)
+    gain = cho_solve(factor, cross.T).T
+    measured = np.array([[each.u, each.v] for each in currents]).ravel()
+    cov = FlowCovariance(own, own, start.lat).of(sea) - gain @ cross.T
+    return readonly(gain @ measured), readonly((cov + cov.T) / 2)
 
 
 def _near(
@@ -184,11 +275,11 @@ def _near(
     for each in currents:
         age = t - (each.start.t + each.end.t) / 2
         is_own = each.glider == glider and each.end.t > until
-        if is_own or not -FLOW_MEMORY < age < FLOW_WINDOW:
+        if is_own or not -SEA_MEMORY < age < FLOW_WINDOW:
             continue
         distance = float(np.hypot(*(_middle(each.start, each.end, start) - middle)))
         if distance <= NEAR:
-            found.append((abs(age) / FLOW_MEMORY + distance / FLOW_SCALE, each))
+            found.append((abs(age) / SEA_MEMORY + distance / FLOW_SCALE, each))
     found.sort(key=lambda pair: (pair[0], pair[1].glider, pair[1].start.t))
     return sorted((each for _, each in found[:MOST_CURRENTS]), key=lambda each: (each.start.t, each.glider))
 
@@ -200,43 +291,3 @@ def _middle(start: Fix, end: Fix, origin: Fix) -> Array:
 def _plane(fixes: Sequence[Fix], origin: Fix) -> Array:
     lat, lon = np.array([fix.lat for fix in fixes]), np.array([fix.lon for fix in fixes])
     return to_plane(lat, lon, origin.lat, origin.lon)
-
-
-def _centres(fixes: Sequence[Fix], origin: Fix, scale: float = FLOW_SCALE) -> Array:
-    """Centres of eddies, a sixth of the scale (m) apart, wherever the dives are and one spread about."""
-    places = _plane(fixes, origin) / scale * (GRID - 1)
-    margin = math.ceil(2 * math.sqrt(SPREAD) * (GRID - 1))
-    low, high = np.floor(places.min(axis=0)) - margin, np.ceil(places.max(axis=0)) + margin
-    x, y = (np.arange(low[k], high[k] + 1) / (GRID - 1) for k in range(2))
-    return np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
-
-
-def _rows(dives: Places, origin: Fix, centres: Array, sizes: FlowSizes) -> tuple[Array, Array]:
-    """The basis averaged along each dive ((2 n, L): u, v of each in turn), scaled by usual sizes; times of u,
-    v (s after the origin's, (2 n,))."""
-    a, b = _plane([d[0] for d in dives], origin), _plane([d[1] for d in dives], origin)
-    t0, t1 = (np.array([d[k].t for d in dives]) - origin.t for k in range(2))
-    places = (a[:, None] + _ALONG[:, None] * (b - a)[:, None]).reshape(-1, 2) / sizes.scale
-    times = (t0[:, None] + _ALONG * (t1 - t0)[:, None]).ravel()
-    mean = [
-        np.einsum("npl,p->nl", part.reshape(len(dives), len(_ALONG), -1), _WEIGHTS)
-        for part in basis(places + 0.5, times, centres + 0.5, sizes.tides)
-    ]
-    rows = np.stack(mean, axis=1).reshape(2 * len(dives), -1)
-    return rows * sizes.deviations(len(centres)), np.repeat((t0 + t1) / 2, 2)
-
-
-def _noise(currents: Sequence[DiveCurrent]) -> Array:
-    """Covariance of the errors of currents."""
-    out = np.zeros((2 * len(currents), 2 * len(currents)))
-    for k, each in enumerate(currents):
-        course = np.array(each.course)
-        part = slice(2 * k, 2 * k + 2)
-        out[part, part] = each.noise**2 * np.eye(2) + each.doubt**2 * np.outer(course, course)
-    return out
-
-
-def _covariance(a: Array, ta: Array, b: Array, tb: Array, fading: int) -> Array:
-    """Covariance of the flow at two sets of dives: ``fading`` functions forget, the others do not."""
-    kept = np.exp(-np.abs(ta[:, None] - tb) / FLOW_MEMORY)
-    return np.asarray(kept * (a[:, :fading] @ b[:, :fading].T) + a[:, fading:] @ b[:, fading:].T)

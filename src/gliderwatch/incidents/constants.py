@@ -23,8 +23,6 @@ REGIME_DIVES = 8
 """Dives back among which a new way of flying is looked for that nobody was notified of: a day of 3 h."""
 TREND_DIVES = 5
 """Dives back whose speeds a message names: half a day to two days of flight."""
-NEIGHBOURS_IN_A_ROW = 2
-"""Surfacings in a row at which the neighbours show a fault, or none, before that is reported."""
 NEIGHBOURS_AGAIN = 7 * 86400.0
 """s after which what the neighbours show is reported once more, if they show it: their currents of four days
 count."""

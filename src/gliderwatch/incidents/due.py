@@ -8,8 +8,8 @@ from math import inf
 from typing import Protocol
 
 from gliderwatch.fleet.advice import Advice
-from gliderwatch.fleet.cross_check import cross_check
 from gliderwatch.fleet.flow import DiveCurrent
+from gliderwatch.fleet.reference import fleet_reference
 from gliderwatch.health.rules import Judged
 from gliderwatch.incidents import aborts, calls, health, irregularities, neighbours, overdue, unjudged
 from gliderwatch.incidents.acknowledgement import Acks
@@ -113,8 +113,8 @@ def _of_fleet(
     last = None if currents is None else facts.last_surfacing(inf)
     if currents is None or last is None:
         return notified, []
-    check = cross_check(currents, last.glider)
-    compared, notices = neighbours.announce(last.glider, notified.neighbours, check, last.t_surface)
+    found = fleet_reference(currents, last.glider)
+    compared, notices = neighbours.announce(last.glider, notified.neighbours, found, last.t_surface)
     return replace(notified, neighbours=compared), notices
 
 

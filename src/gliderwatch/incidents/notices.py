@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gliderwatch.fleet.advice import Advice
-from gliderwatch.fleet.cross_check import Hypothesis, Reference
+from gliderwatch.fleet.cross_check import Hypothesis
+from gliderwatch.fleet.reference import FleetReference
 from gliderwatch.health.rule import Finding
 from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.model import (
@@ -424,14 +425,14 @@ class Irregularity:
 @dataclass(frozen=True, slots=True)
 class DiffersFromNeighbours:
     """The currents of a glider do not fit those of its ``neighbours``, of which the next is ``nearest`` (m)
-    away: ``found`` explains it. Where that is of no glider all have it alike. ``reference``: what moved the
-    water on its last dive by them, and by itself."""
+    away: ``found`` explains it. Where that is of no glider all have it alike. ``reference``: the flow on its
+    last dive by them."""
 
     found: Hypothesis
     neighbours: tuple[str, ...]
     nearest: float
     situation: Situation = NOTHING_ELSE
-    reference: Reference | None = None
+    reference: FleetReference | None = None
 
 
 Content = (

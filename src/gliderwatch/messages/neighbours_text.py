@@ -3,9 +3,11 @@ Pure."""
 
 from __future__ import annotations
 
-from math import degrees, exp
+from math import degrees, exp, sqrt
 
-from gliderwatch.fleet.cross_check import Fault, Hypothesis, Reference
+from gliderwatch.fleet.cross_check import Hypothesis
+from gliderwatch.fleet.flow import Fault
+from gliderwatch.fleet.reference import FleetReference
 from gliderwatch.incidents.notices import DiffersFromNeighbours
 from gliderwatch.messages.evidence import CERTAIN
 from gliderwatch.messages.formatting import clean, flow, utc
@@ -81,12 +83,14 @@ def _amount(fault: Fault, size: float, sigma: float) -> str:
     return f"{abs(degrees(size)):.0f} degrees {side}, ± {1.96 * degrees(sigma):.0f} (95 %)"
 
 
-def _water(reference: Reference | None) -> tuple[tuple[str, str], ...]:
-    """What moved the water on the last dive, by the others and by itself."""
+def _water(reference: FleetReference | None) -> tuple[tuple[str, str], ...]:
+    """What moved the water on the last dive, by the fleet and by itself."""
     if reference is None:
         return ()
-    by_others = f"{flow(*reference.flow)}, ± {1.96 * reference.sigma:.2f} m/s (95 %)"
-    return (("Current, last dive", f"by the others {by_others}; by its own {flow(*reference.own)}"),)
+    (u, v), cov = reference.fused[0].tolist(), reference.fused[1]
+    by_fleet = f"{flow(u, v)}, ± {1.96 * sqrt(cov.trace() / 2):.2f} m/s (95 %)"
+    own = flow(reference.last.u, reference.last.v)
+    return (("Current, last dive", f"by the others and its dives before {by_fleet}; by its own {own}"),)
 
 
 def _names(names: tuple[str, ...]) -> str:

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from gliderwatch.fleet.cross_check import Fault, Hypothesis
+from gliderwatch.fleet.cross_check import Hypothesis
+from gliderwatch.fleet.flow import Fault
 from gliderwatch.health.rule import Finding
 from gliderwatch.incidents.notices import (
     Aborted,

@@ -15,6 +15,7 @@ from gliderwatch.config import Config, expand
 from gliderwatch.delivery.dispatcher import Dispatcher
 from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine, Retry
 from gliderwatch.export.dives import alert_line, assessment_line, write_lines
+from gliderwatch.fleet.reference import beside_neighbours
 from gliderwatch.incidents.constants import GONE
 from gliderwatch.model import Alert, Hindrance, Segment
 from gliderwatch.params import GliderParams
@@ -383,6 +384,7 @@ def _count(
 
 
 def _write(out: Path, store: Store) -> None:
-    assessments = (assessment_line(a) for glider in store.gliders() for a in store.assessments(glider))
-    write_lines(out / ASSESSMENTS, assessments)
+    dives = {glider: store.assessments(glider) for glider in store.gliders()}
+    seen = (a for own in dives.values() for a in beside_neighbours(own, dives.values()))
+    write_lines(out / ASSESSMENTS, map(assessment_line, seen))
     write_lines(out / ALERTS, (alert_line(a) for a in store.alerts()))

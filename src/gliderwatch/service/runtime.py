@@ -49,7 +49,7 @@ class OceanCache:
 
     def field(self, glider: str) -> Field | None:
         """The field to compare a glider with; None where none is wanted or the files cannot be read."""
-        if self._config.glider(glider).reference != "model":
+        if self._config.glider(glider).reference not in ("model", "fleet") or not self._config.ocean.files:
             return None
         seen = tuple(_state(path) for path in expand(self._config.ocean.files))
         if seen != self._seen:

@@ -308,7 +308,7 @@ def _due_messages(
     found = Findings(judged)
     if surfacings:
         found = _with_advice(store, glider, found)
-    if attention.neighbours and params.reference == "dac":
+    if attention.neighbours and params.reference in ("dac", "fleet"):
         found = replace(found, currents=_currents(store, glider, before))
     what = due(before, facts, wanted, found, now)
     alerts = tuple(map(_rendered, what.notices))
@@ -336,7 +336,7 @@ def _with_advice(store: Store, glider: str, found: Findings) -> Findings:
 
 def _currents(store: Store, glider: str, notified: NotificationState) -> list[DiveCurrent] | None:
     """The currents of all gliders about the last surfacing of one, None where it was compared already. Only
-    gliders that are compared with their own currents (`reference: dac`) have them in their assessments."""
+    gliders with `reference: dac` or `fleet` have their own currents in their assessments."""
     last, before = store.facts(glider).last_surfacing(inf), notified.neighbours
     if last is None or (before is not None and before.checked >= last.t_surface):
         return None
