@@ -13,8 +13,8 @@ this is much faster.
 - flow: the error of the current of a dive (cm/s, a component, rms) as told by the others alone
   (`fleet.reference`), and as fused with its own dives before, beside the mean of the glider's own currents so
   far, and its last one; by the distance of the nearest; and NEES of both.
-- faults: from the fourth day on the first glider has a fault. Told: `fleet_reference` has it within 48 h. False:
-  that it has one of another glider, or before.
+- faults: from the fourth day on the first glider has a fault. Told: `fleet_reference` has it within 48 h.
+  False: that it has one of another glider, or before.
 """
 
 from __future__ import annotations
