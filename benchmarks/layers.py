@@ -2,7 +2,8 @@
 
 `python benchmarks/layers.py ../shared/data`: for each mission the time to find the casts of a segment, their
 composite and layers, and the advice; that of both methods; and how long dbdreader takes to read the science
-file alone, in the same run.
+file alone, in the same run. Then coverage and travel of each method on the water of the mission, beside those
+of a prototype.
 """
 
 from __future__ import annotations
@@ -26,6 +27,13 @@ from gliderwatch.store import codec
 
 MISSIONS = ("usf-sam-2019", "maria-2022", "electa-2022")
 REPEATS = 5
+REFERENCE = {
+    "usf-sam-2019": "0.99, 1.00; 0.99, 0.92; 0.28, 0.53; 0.50, 0.60; 0.47, 0.51; 0.98, 0.75; 0.99, 0.76",
+    "maria-2022": "1.00, 1.00; 0.74, 0.12; 0.77, 0.21; 0.84, 0.26; 0.76, 0.32; 0.83, 0.37; 0.99, 0.83",
+    "electa-2022": "1.00, 1.00; 0.90, 0.27; 0.93, 0.35; 0.93, 0.75; 0.92, 0.35; 0.99, 0.43; 1.00, 0.64",
+}
+"""Coverage and travel that a prototype had on the same missions, in the order of `flown.methods`; its
+extensions are not on record."""
 
 
 def segments_of(mission: Path) -> tuple[list[Segment], float]:
@@ -73,10 +81,17 @@ def main(data: Path) -> None:
 
 
 def _compare(name: str, segments: list[Segment]) -> None:
+    """Each method beside the reference: `near` where the coverage is at least that less 0.02, and the travel
+    at most that and 0.05."""
     found = flown.compare([casts_of(segment, "temperature") for segment in segments], "temperature")
-    for method, flights in found.items():
+    for (method, flights), reference in zip(found.items(), REFERENCE[name].split("; "), strict=True):
         one = flown.total(flights)
-        print(f"  {name:<14}{method:<32}coverage {one.coverage:.2f}, travel {one.travel:.2f}")
+        coverage, travel = map(float, reference.split(", "))
+        near = round(one.coverage, 2) >= coverage - 0.02 and round(one.travel, 2) <= travel + 0.05
+        print(
+            f"  {name:<14}{method:<28}coverage, travel {one.coverage:.2f}, {one.travel:.2f}"
+            f"   reference {reference}{'   near' if near else ''}"
+        )
 
 
 if __name__ == "__main__":

@@ -22,6 +22,16 @@ def test_simulate_draws_the_run_and_says_what_it_covered(tmp_path: Path) -> None
     assert "<svg" in Path(found["figure"]).read_text(encoding="utf-8")[:500]
 
 
+def test_simulate_says_whether_layers_that_jumped_were_found_again(tmp_path: Path) -> None:
+    result = run("simulate", "--jump", "10", "--out", tmp_path, "--json")
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.output)
+    assert found["coverage_after_jump"] == 0.0
+    assert found["resets"] == 1
+    assert 273 < found["found_again_after_s"] < 273 + 4 * 91  # three periods of patience, then four
+    assert found["coverage_at_end"] > 0.99
+
+
 @pytest.mark.real
 def test_replay_compares_the_methods(shared_data: Path) -> None:
     mission = shared_data / "usf-sam-2019"

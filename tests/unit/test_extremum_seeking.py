@@ -12,7 +12,7 @@ from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 from gliderwatch.model import Array
 from gliderwatch.papers import extremum_seeking as seeking
 from gliderwatch.papers.extremum_seeking import Cost, Estimate, Mode, SeekingParams
-from gliderwatch.papers.seeking_vehicle import PRESETS, Water, coverage, fly, outside
+from gliderwatch.papers.seeking_vehicle import PRESETS, Run, coverage, fly, outside
 
 
 def noise(params: SeekingParams, seconds: float, seed: int = 0) -> Array:
@@ -118,21 +118,39 @@ def test_two_runs_of_one_seed_are_one_run() -> None:
     assert np.array_equal(one.measured, other.measured)
 
 
-def test_run_of_table_2_starts_where_figure_10_does() -> None:
+def test_run_of_table_2_is_that_of_figure_10() -> None:
+    """It begins in the upper layer, covers that alone in its first period, and sinks to the lower one."""
     preset = PRESETS["field"]
-    run = fly(preset.params, preset.water, noise(preset.params, 300.0))
+    run = fly(preset.params, preset.water, noise(preset.params, 800.0))
     start = float(run.t[run.tracking > 0][0])
-    assert start == pytest.approx(175.0, abs=5.0)
-    assert run.depth[run.t == start][0] == pytest.approx(5.5, abs=0.7)
-    tracked = run.depth[run.tracking > 0]
-    assert tracked.max() - tracked.min() == pytest.approx(10.0, abs=0.5)
+    assert start == pytest.approx(175.0, abs=6.0)
+    assert run.depth[run.t == start][0] == pytest.approx(5.5, abs=1.0)
+    first = run.depth[(run.t >= start) & (run.t < start + preset.params.period)]
+    assert (first.min(), first.max()) == pytest.approx((1.8, 11.0), abs=0.2)
+    later = run.depth[run.t > 630.0]
+    assert later.max() > 14.5  # into the lower layer, from 13.5 m on
+    assert 4.5 < later.min() < 6.5  # of the upper one the steepest part alone
 
 
-def test_a_layer_that_jumps_is_found_again_after_a_reset() -> None:
-    water = Water((0, 4, 7, 20), (15, 15, 10, 10), ((4.0, 7.0),), 20.0)
-    params = replace(SeekingParams(), dt=0.1, amplitude=0.027, gain=3e-4)
-    run = fly(params, water, noise(params, 1400.0), shift=lambda t: 9.0 if t > 400.0 else 0.0)
+FAST = replace(SeekingParams(), dt=0.1, amplitude=0.027, gain=3e-4)
+"""Table 1 at half its steps."""
+
+
+def jumping(by: float, seconds: float) -> Run:
+    """A run in which both layers jump down by so many m at 450 s."""
+    water = replace(PRESETS["simulation"].water, bottom=20.0 + max(by, 0.0))
+    return fly(FAST, water, noise(FAST, seconds), shift=lambda t: by if t > 450.0 else 0.0)
+
+
+def test_layers_that_jump_out_of_the_band_are_found_again_after_a_reset() -> None:
+    run, layers = jumping(10.0, 1500.0), PRESETS["simulation"].water.layers
     assert run.resets == 1
     assert Mode.SURFACING in run.mode
-    assert min(coverage(run, water.layers, 200.0)[:3]) > 0.95
-    assert min(coverage(run, ((13.0, 16.0),), 1000.0)) > 0.95
+    assert min(coverage(run.until(450.0), layers, 300.0)) > 0.95
+    moved = tuple((top + 10.0, bottom + 10.0) for top, bottom in layers)
+    assert min(coverage(run, moved, 1250.0)) > 0.95
+
+
+def test_a_layer_that_stays_in_the_band_is_no_reset() -> None:
+    """Where both rise by 4 m, the lower one is left in the band, 0.57 as steep as the upper: above 0.5."""
+    assert jumping(-4.0, 800.0).resets == 0

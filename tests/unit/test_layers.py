@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gliderwatch.layers import flown
-from gliderwatch.layers.band import Band, Method, Mode, Tracking, cost_slope, follow
+from gliderwatch.layers.band import Band, Method, Mode, Tracking, cost_slope, costs_of, follow
 from gliderwatch.layers.casts import Cast, bin_of, split
 from gliderwatch.layers.composite import composite, layers_of
 from gliderwatch.layers.constants import LEAST_BIN
@@ -185,10 +185,40 @@ def test_the_filter_moves_the_band_to_where_the_layer_goes() -> None:
     tracking = after(casts_in(warm_above(40.0, 60.0)))
     assert tracking.band is not None
     deeper = [c.within(38.0, 62.0) for c in casts_in(warm_above(52.0, 72.0))]
-    assert cost_slope(deeper, tracking.peak) > 0
+    assert cost_slope([costs_of(cast, tracking.peak) for cast in deeper]) > 0
     moved = follow(tracking, deeper, "temperature", Method.FILTER)
     assert moved.band is not None
     assert moved.band.top > tracking.band.top
+
+
+def test_the_filter_is_reset_by_its_cost_alone() -> None:
+    """Not by the composite: half of the casts show the layer, which the filter sees; none is a reset."""
+    tracking = after(casts_in(warm_above(40.0, 60.0)))
+    even = [c.within(38.0, 62.0) for c in casts_in(warm_above(40.0, 60.0, difference=0.5))]
+    some = [*even[:4], *[c.within(38.0, 62.0) for c in casts_in(warm_above(40.0, 60.0))[:2]]]
+    assert follow(tracking, some, "temperature").mode is Mode.RESET
+    assert follow(tracking, some, "temperature", Method.FILTER).mode is Mode.TRACK
+    lost = follow(tracking, even, "temperature", Method.FILTER)
+    assert (lost.mode, lost.band, lost.why) == (Mode.RESET, None, "its cost stayed below 50% of the largest")
+
+
+def test_samples_close_to_each_other_are_no_steps_of_the_filter() -> None:
+    z = np.arange(0.0, 10.0, 0.0625)
+    found = costs_of(Cast(readonly(z), readonly(z), readonly(0.4 * z)), 0.8)
+    assert [d for d, _ in found] == pytest.approx([0.25] * len(found))
+    assert [cost for _, cost in found] == pytest.approx([0.5] * len(found))
+    assert costs_of(Cast(readonly(z), readonly(z), readonly(z)), 0.0) == []
+
+
+def test_bins_stay_as_they_were_while_a_layer_is_tracked() -> None:
+    """Gradients of coarser samples, in a band of few, are compared in the bins of the first segment."""
+    tracking = after(casts_in(warm_above(40.0, 60.0)))
+    coarse = [
+        Cast(c.t[::4], c.depth[::4], c.value[::4]).within(38.0, 62.0)
+        for c in casts_in(warm_above(40.0, 60.0))
+    ]
+    found = follow(tracking, coarse, "temperature")
+    assert (found.mode, found.bin) == (Mode.TRACK, tracking.bin)
 
 
 # --------------------------------------------------------------------------- flown

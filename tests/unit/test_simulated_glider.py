@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import find_peaks
 
 from gliderwatch.simulate.flight import (
     Airframe,
@@ -15,9 +16,10 @@ from gliderwatch.simulate.flight import (
     steady_glide,
     written,
 )
-from gliderwatch.simulate.glider import simulate
+from gliderwatch.simulate.glider import simulate, voyage
 from gliderwatch.simulate.ocean import Constituent, Ellipse, Sea, make_ocean
 from gliderwatch.simulate.scenario import FixIn, Scenario
+from gliderwatch.simulate.vehicle import Yo
 from simulated import DAY, EVERY_CYCLE, STRAIGHT, closures, degrees, samples
 
 # --------------------------------------------------------------------------- closure
@@ -259,3 +261,22 @@ def test_the_ocean_does_not_go_on_beyond_its_span() -> None:
     ocean = make_ocean(Sea(), 0.0, DAY, np.random.default_rng(0))
     with pytest.raises(ValueError, match="longer mission"):
         ocean.current(np.array([2 * DAY]), np.zeros(1), np.zeros(1))
+
+
+def test_yos_of_the_pilot_are_flown_from_the_next_dive_on() -> None:
+    """Two half cycles from 5 to 40 m, then from 20 to 30 m until it is to surface."""
+    going = voyage(replace(STRAIGHT, days=0.3, bottom_sigma=0.0))
+    first = next(going)
+    mission = going.send((Yo(5.0, 40.0, 2), Yo(20.0, 30.0)))
+    t, depth = samples(mission, "m_depth")
+    assert depth[t < first.truth[0].t_surface].max() > 55.0
+    depth = depth[t > mission.truth[-1].t_dive]
+    deep, shallow = (find_peaks(sign * depth, prominence=5.0)[0] for sign in (1, -1))
+    assert depth[deep] == pytest.approx([40.0, *[30.0] * (len(deep) - 1)], abs=1.5)
+    assert depth[shallow] == pytest.approx([5.0, *[20.0] * (len(shallow) - 1)], abs=1.5)
+
+
+def test_a_voyage_without_a_pilot_is_the_simulated_mission() -> None:
+    scenario = replace(STRAIGHT, days=0.4)
+    *_, whole = voyage(scenario)
+    assert [s.header for s in whole.segments] == [s.header for s in simulate(scenario).segments]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 
 _NOISE = 0.002
 """°C: noise of a CTD of today (SBE 49: 0.002)."""
+_AFTER_JUMP = 3000.0
+"""s: how long the loop goes on after a jump: a reset and four periods, or the gain's way over 3 m."""
+_FOUND = 0.95
+"""A leg that covers this part of the layers has found them."""
 
 
 @click.group()
@@ -31,26 +35,36 @@ def layers() -> None:
 @click.option("--preset", "name", type=click.Choice(["simulation", "field"]), default="simulation")
 @click.option("--seed", type=click.IntRange(0), default=0, help="Chance of its own for each seed (0).")
 @click.option(
+    "--jump", type=float, help="At its end the layers jump down by so many m, and it goes on 3000 s."
+)
+@click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
     default=Path(),
     help="Folder for the figure (here).",
 )
 @click.option("--json", "as_json", is_flag=True, help="Numbers as JSON.")
-def simulate(name: str, seed: int, out: Path, as_json: bool) -> None:
+def simulate(name: str, seed: int, jump: float | None, out: Path, as_json: bool) -> None:
     """Run the loop of paper 004 again, and draw its depth and temperature.
 
-    The preset simulation is that of Table 1 (Figs. 7 and 8), field that of Table 2 (Figs. 9 and 10).
+    The preset simulation is that of Table 1 (Figs. 7 and 8), field that of Table 2 (Figs. 9 and 10). Below a
+    jump the water is deeper by as much.
     """
     import numpy as np
 
     from gliderwatch.papers.seeking_vehicle import PRESETS, fly
 
     preset = PRESETS[name]
-    steps = round(preset.seconds / preset.params.dt)
-    run = fly(preset.params, preset.water, np.random.default_rng(seed).normal(0.0, _NOISE, steps))
+    by, at = jump or 0.0, preset.seconds
+    water = replace(preset.water, bottom=preset.water.bottom + max(by, 0.0))
+    steps = round((at if jump is None else at + _AFTER_JUMP) / preset.params.dt)
+    noise = np.random.default_rng(seed).normal(0.0, _NOISE, steps)
+    run = fly(preset.params, water, noise, lambda t: by if t >= at else 0.0)
     path = out / f"layers-{name}.svg"
-    found = _summary(preset, run) | {"figure": str(path)}
+    found = _summary(preset, run, preset.seconds)
+    if jump is not None:
+        found |= _after_jump(run, water.layers, jump, at)
+    found |= {"resets": run.resets, "figure": str(path)}
     out.mkdir(parents=True, exist_ok=True)
     _draw(path, preset, run)
     if as_json:
@@ -127,14 +141,15 @@ def _casts(mission: Path, caches: Sequence[Path], glider: str | None, sensor: st
     return [casts_of(one, sensor) for one in chosen]
 
 
-def _summary(preset: Preset, run: Run) -> dict[str, Any]:
-    """What the run did from four periods after the loop began."""
+def _summary(preset: Preset, run: Run, until: float) -> dict[str, Any]:
+    """What the run did from four periods after the loop began `until` a time (s)."""
     from gliderwatch.papers.extremum_seeking import reach
     from gliderwatch.papers.seeking_vehicle import coverage, outside
 
+    run = run.until(until)
     tracked = run.t[run.tracking > 0]
     if not len(tracked):
-        return {"began": None, "resets": run.resets}
+        return {"began": None}
     settled = float(tracked[0]) + 4 * preset.params.period
     covered = coverage(run, preset.water.layers, settled)
     return {
@@ -145,7 +160,22 @@ def _summary(preset: Preset, run: Run) -> dict[str, Any]:
         "coverage_mean": round(sum(covered) / len(covered), 3),
         "coverage_least": round(min(covered), 3),
         "travel_outside_layers": round(outside(run, preset.water.layers, settled), 3),
-        "resets": run.resets,
+    }
+
+
+def _after_jump(run: Run, layers: tuple[tuple[float, float], ...], jump: float, at: float) -> dict[str, Any]:
+    """What the run did from the time `at` (s) on, when its `layers` (m) had jumped down by `jump` (m)."""
+    from gliderwatch.papers.seeking_vehicle import coverage, legs
+
+    moved = tuple((top + jump, bottom + jump) for top, bottom in layers)
+    covered, ways = coverage(run, moved, at), legs(run, at)
+    lost = [i for i, part in enumerate(covered) if part < _FOUND]
+    again = ways[lost[-1] + 1][0] if lost and lost[-1] + 1 < len(ways) else None
+    return {
+        "jump_m": jump,
+        "coverage_after_jump": round(covered[1], 3),
+        "found_again_after_s": None if again is None else round(float(run.t[again]) - at),
+        "coverage_at_end": round(covered[-1], 3),
     }
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import chain
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from gliderwatch.layers.casts import Cast, bin_of
 from gliderwatch.layers.composite import Composite, Layer, composite, layers_of
 from gliderwatch.model import Array
 from gliderwatch.papers.extremum_seeking import begin, step
+
+Costs = list[tuple[float, float]]
+"""Of one cast: how much deeper (m) from sample to sample, and the cost (1) there."""
 
 
 class Method(StrEnum):
@@ -48,8 +52,8 @@ class Tracking:
 
     ``mode`` and ``band`` are the advice for the next segment; the band is None where all depths are to be
     flown. ``top`` and ``bottom`` (m) are the smoothed limits of the layers, ``peak`` (unit per m) the
-    reference of the gradient, ``complete_t`` (s) the end of the last segment of all depths, ``bin`` (m)
-    and ``layers`` those of the last segment, ``why`` says in words why the mode is what it is.
+    reference of the gradient, ``complete_t`` (s) the end of the last segment of all depths, ``bin`` (m) the
+    height of its bins; ``layers`` are those of the last segment, ``why`` says in words why the mode is so.
     """
 
     mode: Mode = Mode.COMPLETE
@@ -77,20 +81,24 @@ def follow(
     """
     if len(casts) < c.LEAST_CASTS:
         return before
-    height = bin_of(casts)
+    # While it tracks, in the bins of the last segment of all depths: gradients in others are not alike, and
+    # the few samples within a band would have others.
+    height = bin_of(casts) if before.band is None else before.bin
     found = composite(casts, height)
     now = replace(before, layers=layers_of(found, property_name), bin=height)
     last_t = float(casts[-1].t[-1])
     if before.complete_t is None or _flew_all(before.band, casts, height):
         now = replace(now, complete_t=last_t)
-    lost = _lost(before, now, found, last_t)
+    by_filter = method is Method.FILTER and before.band is not None
+    costs = [costs_of(cast, before.peak) for cast in casts] if by_filter else []
+    lost = _low(costs) if by_filter else _lost(before, now, found, last_t)
     if lost:
         mode = Mode.COMPLETE if before.band is None else Mode.RESET
         # Where all depths were seen and nothing is there, what was known of the layer is of no use any more.
         return replace(now, mode=mode, band=None, top=None, bottom=None, peak=found.peak, why=lost)
     extension = extension or max(c.LEAST_EXTENSION, height)
-    if method is Method.FILTER and before.band is not None:
-        return _shifted(now, casts, extension)
+    if by_filter:
+        return _shifted(now, costs, extension)
     return _tracked(before, now, found, extension)
 
 
@@ -144,36 +152,55 @@ def _steady(before: Band | None, band: Band, extension: float) -> Band:
     return before if change < c.STILL * extension else band
 
 
-def _shifted(now: Tracking, casts: Sequence[Cast], extension: float) -> Tracking:
+def _low(costs: Sequence[Costs]) -> str:
+    """Why the filter is to be reset, as in 004 (Fig. 3); empty where it is not."""
+    largest = max((cost for cast in costs for _, cost in cast), default=0.0)
+    return f"its cost stayed below {c.LOST:.0%} of the largest" if largest < c.LOST else ""
+
+
+def _shifted(now: Tracking, costs: Sequence[Costs], extension: float) -> Tracking:
     """The band moved by the gradient of the cost that the filter of 004 finds along the casts."""
     assert now.top is not None
     assert now.bottom is not None
     half = (now.bottom - now.top) / 2 + extension
-    slope = cost_slope(casts, now.peak)
-    shift = max(float(np.clip(c.SHIFT * half**2 * slope, -half / 2, half / 2)), extension - now.top)
+    shift = max(
+        float(np.clip(c.SHIFT * half**2 * cost_slope(costs), -half / 2, half / 2)), extension - now.top
+    )
     top, bottom = now.top + shift, now.bottom + shift
     band = _steady(now.band, Band(max(top - extension, 0.0), bottom + extension), extension)
     return replace(now, mode=Mode.TRACK, band=band, top=top, bottom=bottom, why="")
 
 
-def cost_slope(casts: Sequence[Cast], peak: float) -> float:
-    """Mean of dJ/dz (1/m) that the filter of 004 finds along `casts`; J is the gradient, of `peak` (unit/m).
+def cost_slope(costs: Sequence[Costs]) -> float:
+    """Mean of dJ/dz (1/m) that the filter of 004 finds along casts, by the `costs` of each.
 
     The motion from sample to sample is the perturbation of eq. (5a).
     """
     slopes = list[float]()
     estimate = begin(c.FILTER_Q, c.FILTER_R)
-    for cast in casts:
-        for d, cost in _costs(cast, peak):
-            estimate = step(estimate, d, 0.0, cost, c.FILTER_Q, c.FILTER_R)
-            slopes.append(estimate.gradient)
+    for d, cost in chain.from_iterable(costs):
+        estimate = step(estimate, d, 0.0, cost, c.FILTER_Q, c.FILTER_R)
+        slopes.append(estimate.gradient)
     return float(np.mean(slopes)) if slopes else 0.0
 
 
-def _costs(cast: Cast, peak: float) -> list[tuple[float, float]]:
-    """Change of depth (m) and normalised cost of eq. (6) from each sample of a cast to the next."""
-    dz: Array = np.diff(cast.depth)
-    dv: Array = np.diff(cast.value)
-    with np.errstate(all="ignore"):
-        cost = np.where(np.abs(dz) > c.LEAST_STEP, np.abs(dv / dz), 0.0) / peak
-    return list(zip(dz.tolist(), np.minimum(cost, 1.0).tolist(), strict=True)) if peak > 0 else []
+def costs_of(cast: Cast, peak: float) -> Costs:
+    """Change of depth (m) and normalised cost of eq. (6), of samples that lie `LEAST_STEP` apart in depth.
+
+    J is the gradient as a part of the largest, `peak` (unit/m), 1 at most. None where `peak` is not above 0.
+    """
+    if not peak > 0:
+        return []
+    kept = _apart(cast.depth)
+    dz, dv = np.diff(cast.depth[kept]), np.diff(cast.value[kept])
+    cost = np.minimum(np.abs(dv / dz) / peak, 1.0)
+    return list(zip(dz.tolist(), cost.tolist(), strict=True))
+
+
+def _apart(depth: Array) -> list[int]:
+    """The first sample, and each that lies more than `LEAST_STEP` from the one kept before it."""
+    kept = [0] if len(depth) else []
+    for i, z in enumerate(depth.tolist()):
+        if abs(z - depth[kept[-1]]) > c.LEAST_STEP:
+            kept.append(i)
+    return kept

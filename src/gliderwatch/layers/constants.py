@@ -50,8 +50,6 @@ SHIFT = 0.25
 """1: part of (half a band)^2 times dJ/dz by which the band moves in a segment; in Table 1, 0.02 a period."""
 FULL_CASTS = 2
 """Casts over all depths in each segment, down and up: they see what the band does not."""
-PEAK_EXTENSION = 4.0
-"""Bins: what the method that follows the peak adds; it has the travel of the published method with it."""
 COUNTED = 6
 """Casts that a segment has to have to count in a comparison of methods: shorter ones are test dives."""
 LATITUDE = 45.0

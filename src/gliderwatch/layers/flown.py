@@ -13,14 +13,13 @@ import numpy as np
 
 from gliderwatch.layers.band import Band, Method, Mode, Tracking, follow
 from gliderwatch.layers.casts import Cast, bin_of
-from gliderwatch.layers.composite import Composite, composite
+from gliderwatch.layers.composite import FLOORS, Composite, composite
 from gliderwatch.layers.constants import (
     COUNTED,
     FULL_CASTS,
     LEAST_CASTS,
     LEAST_EXTENSION,
     PART_OF_PEAK,
-    PEAK_EXTENSION,
 )
 from gliderwatch.model import Array
 
@@ -105,34 +104,38 @@ def kept(before: Tracking, casts: Sequence[Cast], property_name: str) -> Trackin
     return before if before.band is not None else follow(before, casts, property_name)
 
 
-def peak(before: Tracking, casts: Sequence[Cast]) -> Tracking:
-    """The depth of the largest gradient of the last cast, `PEAK_EXTENSION` bins up and down (Zhang et al.,
-    2012)."""
-    if not casts:
+def peak(before: Tracking, casts: Sequence[Cast], property_name: str) -> Tracking:
+    """The depth of the largest gradient of the last cast, with the height of the first band (Zhang et al.,
+    2012: extended until the whole layer is covered)."""
+    if before.band is None:
+        before = follow(before, casts, property_name)
+    if before.band is None or not casts:
         return before
     found = composite([casts[-1]] * LEAST_CASTS, bin_of(casts))
     if not found.peak > 0:
         return before
+    assert before.top is not None
+    assert before.bottom is not None
     i = int(np.nanargmax(np.abs(found.gradient)))
-    middle, half = (found.edges[i] + found.edges[i + 1]) / 2, PEAK_EXTENSION * found.bin
+    middle = (found.edges[i] + found.edges[i + 1]) / 2
+    half = (before.bottom - before.top) / 2 + max(LEAST_EXTENSION, before.bin)
     return _banded(before, middle - half, middle + half)
 
 
-def threshold(before: Tracking, casts: Sequence[Cast]) -> Tracking:
+def threshold(before: Tracking, casts: Sequence[Cast], property_name: str) -> Tracking:
     """From the first to the last depth of the last cast where the gradient is above a threshold that is set
-    once, a quarter of the peak of the first segment; extended by a bin (Feng et al., 2021)."""
+    in advance, the floor of the property; extended by a bin (Feng et al., 2021)."""
     if not casts:
         return before
     height = bin_of(casts)
-    least = before.peak or PART_OF_PEAK * composite(casts, height).peak
     found = composite([casts[-1]] * LEAST_CASTS, height)
     with np.errstate(invalid="ignore"):
-        above = np.flatnonzero(np.abs(found.gradient) > least)
+        above = np.flatnonzero(np.abs(found.gradient) > FLOORS.get(property_name, 0.0))
     if not len(above):
-        return replace(before, peak=least)
+        return before
     extension = max(LEAST_EXTENSION, height)
     top, bottom = found.edges[above[0]] - extension, found.edges[above[-1] + 1] + extension
-    return replace(_banded(before, float(top), float(bottom)), peak=least)
+    return _banded(before, float(top), float(bottom))
 
 
 def _banded(before: Tracking, top: float, bottom: float) -> Tracking:
@@ -145,8 +148,8 @@ def methods(property_name: str) -> dict[str, tuple[Advise, int]]:
     return {
         "full yos": (full, 0),
         "first band kept": (partial(kept, property_name=property_name), 0),
-        "peak of the last cast": (peak, 0),
-        "threshold of the first segment": (threshold, 0),
+        "peak of the last cast": (partial(peak, property_name=property_name), 0),
+        "threshold set in advance": (partial(threshold, property_name=property_name), 0),
         "filter": (partial(follow, property_name=property_name, method=Method.FILTER), 0),
         "composite": (by_composite, 0),
         "composite, two full casts": (by_composite, FULL_CASTS),

@@ -22,8 +22,9 @@ class SeekingParams:
     t_win (s) of the moving averages, ``dt`` (s) the control step, ``speed`` (m/s) of a complete dive. The
     loop is given up where the cost stayed below ``lost`` for ``patience`` periods (T_cd = 3 T_p).
 
-    Table 1 has two windows, 1 s and 2 s. With 2 s the blended profile at a turn gives a cost above 1, which
-    drives the loop off its layer; 1 s gives Figs. 7 and 8.
+    The window of 2 s in Tables 1 and 2 we read as that of both averages together, 1 s each: so the runs are
+    those of Figs. 7, 8 and 10. With 2 s each, the blended profile at a turn gives a cost above 1, which
+    drives the loop off its layer, and by Table 2 it does not sink to the lower layer.
     """
 
     period: float = 91.0

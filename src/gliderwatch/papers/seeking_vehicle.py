@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -125,6 +125,18 @@ class Run:
         """1 where the loop tracks a layer, else 0."""
         return np.array([mode is Mode.TRACK for mode in self.mode], dtype=float)
 
+    def until(self, t: float) -> Run:
+        """Its steps before `t` (s)."""
+        n = int(np.searchsorted(self.t, t))
+        return replace(
+            self,
+            t=self.t[:n],
+            depth=self.depth[:n],
+            measured=self.measured[:n],
+            cost=self.cost[:n],
+            mode=self.mode[:n],
+        )
+
 
 def fly(
     params: SeekingParams, water: Water, noise: Array, shift: Callable[[float], float] = lambda t: 0.0
@@ -208,8 +220,9 @@ PRESETS = {
         ),
         1000.0,
     ),
-    # Table 2 and Fig. 10 (down in 100 s, the loop begins at 5.5 m). Of the profile of Fig. 9 the text gives
-    # depths only; the temperatures are ours, with the steepest part where it is said to be.
+    # Table 2 and Fig. 10 (down in 100 s, the loop begins at 5.5 m). Of the profile of Fig. 9 the text
+    # gives depths only; the temperatures are ours, with a lower layer a little more than half as steep as
+    # the upper: so the loop sinks as in Fig. 10. A steeper one it meets first.
     "field": Preset(
         SeekingParams(
             period=111.0,
@@ -219,13 +232,12 @@ PRESETS = {
             q=5e-5,
             z_min=0.2,
             threshold=0.6,
-            window=2.0,
             dt=1 / 9,
             speed=0.2,
         ),
         Water(
             (0, 3, 6.5, 7.5, 13.5, 15.5, 20),
-            (13.2, 13.2, 12.6, 11.3, 10.4, 9.0, 8.9),
+            (13.4, 13.0, 10.7, 9.4, 8.8, 7.4, 7.1),
             ((3.0, 7.5), (13.5, 15.5)),
             20.0,
         ),

@@ -4,6 +4,8 @@ scenario."""
 from __future__ import annotations
 
 import time
+from collections import deque
+from collections.abc import Generator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -27,7 +29,7 @@ from gliderwatch.simulate.telemetry import (
     everything,
     sensor_list,
 )
-from gliderwatch.simulate.vehicle import Glider
+from gliderwatch.simulate.vehicle import Glider, Yo
 
 # ----------------------------------------
 # One glider's mission, simulated with its truth. Pure given the seed of the scenario.
@@ -48,8 +50,19 @@ def simulate(scenario: Scenario) -> Mission:
     Raises:
         ValueError: no steady glide.
     """
+    return deque(voyage(scenario), maxlen=1)[0]
+
+
+def voyage(scenario: Scenario) -> Generator[Mission, tuple[Yo, ...] | None, None]:
+    """The mission of `simulate` as far as it has come, each time that files were sent; at last the whole.
+
+    The yos that are sent back are flown from the next dive on.
+
+    Raises:
+        ValueError: no steady glide.
+    """
     glider = _launch(scenario)
-    files, truth = _Files(glider), []
+    files, truth = _Files(glider), list[DiveTruth]()
     plan, _ = surface(glider, None)
     name, opened = files.next_name(), plan.opened
     while glider.time(glider.cycle) < scenario.start + 86400 * scenario.days:
@@ -64,9 +77,10 @@ def simulate(scenario: Scenario) -> Mission:
         if plan.own_file:
             files.close(files.next_name(), *plan.own_file)
         name, opened = files.next_name(), plan.opened
+        glider.yos = (yield files.mission(tuple(truth))) or glider.yos
     files.close(name, opened, glider.cycle)
     files.send(float(glider.rng.uniform(*_SENDING)))
-    return files.mission(tuple(truth))
+    yield files.mission(tuple(truth))
 
 
 def _launch(scenario: Scenario) -> Glider:

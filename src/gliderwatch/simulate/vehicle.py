@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import repeat
 from math import ceil, exp, hypot, sqrt
 from typing import NamedTuple
 
@@ -24,6 +25,16 @@ NODE = 15
 _TRIM_MEMORY = 86400.0
 
 
+@dataclass(frozen=True, slots=True)
+class Yo:
+    """A behavior of a dive: climb to ``top`` and dive to ``bottom`` (m), ``half_cycles`` times in all; None:
+    until the glider is to surface."""
+
+    top: float
+    bottom: float
+    half_cycles: int | None = None
+
+
 @dataclass(slots=True)
 class Glider:
     """State of a glider.
@@ -34,7 +45,8 @@ class Glider:
     origin of its local mission coordinates. ``against`` (unit vector) is the way of the current that
     sets against it; ``inflections`` counts, ``charge`` (A h) is used up; ``trim`` is what the water adds to
     its drive, in units of `Scenario.drive_sigma`. ``rng`` moves the glider,
-    ``luck`` all that came to be simulated later, so that neither disturbs the other.
+    ``luck`` all that came to be simulated later, so that neither disturbs the other. ``yos`` are flown one
+    after another in each dive, the last without an end; none: to the depths of the scenario.
     """
 
     scenario: Scenario
@@ -57,6 +69,7 @@ class Glider:
     inflections: int = 0
     charge: float = 0.0
     trim: float = 0.0
+    yos: tuple[Yo, ...] = ()
     health: Health = field(init=False)
     trimming: np.random.Generator = field(init=False)
 
@@ -68,6 +81,15 @@ class Glider:
         """Let ``trim`` wander by the time of a dive."""
         kept = exp(-self.scenario.interval / _TRIM_MEMORY)
         self.trim = kept * self.trim + sqrt(1 - kept**2) * float(self.trimming.standard_normal())
+
+    def turns(self) -> Iterator[tuple[float, float]]:
+        """Upper and lower turn (m) of each leg of a dive, without end."""
+        for yo in self.yos:
+            if yo.half_cycles is not None:
+                yield from repeat((yo.top, yo.bottom), yo.half_cycles)
+            else:
+                yield from repeat((yo.top, yo.bottom))
+        yield from repeat(self.scenario.depths)
 
     def time(self, cycle: int) -> float:
         """Time (s) of a cycle."""
@@ -214,9 +236,10 @@ def _legs(glider: Glider, way: _Way) -> Iterator[_Piece]:
     """The legs of a dive, one after another, until it is time to surface."""
     scenario, rng, health = glider.scenario, glider.rng, glider.health
     elapsed, depth, start = 0.0, 0.0, glider.time(glider.cycle)
-    top, bottom = scenario.depths
-    down, surfacing = True, False
+    down, turns = True, glider.turns()
+    surfacing = False
     while not surfacing:
+        top, bottom = next(turns)
         pitch = scenario.pitch + scenario.pitch_sigma * rng.standard_normal()
         speed = _glide(glider, pitch, down, start + elapsed)[0].vertical * health.free(start + elapsed)
         if down:
