@@ -17,6 +17,7 @@ import re
 import sys
 import time
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -71,7 +72,7 @@ def casts_of(segment: SegmentData) -> list[tuple[float, float]]:
         elif abs(z - ends[-1]) > 5.0:
             sign = 1 if z > ends[-1] else -1
             ends.append(z)
-    return list(zip(ends[:-1], ends[1:], strict=True))
+    return list(pairwise(ends))
 
 
 def covered(water: Water, t: float, casts: Sequence[tuple[float, float]]) -> float:
