@@ -41,6 +41,7 @@ TESTS = {
     "forecast": "unit/test_heuristics_forecast unit/test_kalman_expected_flow unit/test_forecast_steering"
     " unit/test_forecast_surfacing unit/test_forecast_timing unit/test_forecast_waypoints"
     " property/test_forecast",
+    "health": "unit/test_health_rules unit/test_health_incidents",
     "incidents": "unit/test_heuristics_incidents unit/test_notifications unit/test_state_machine"
     " unit/test_overdue unit/test_unjudged unit/test_send_schedule",
 }
@@ -59,12 +60,13 @@ class Change:
 
 
 def constants(room: str) -> list[tuple[str, str]]:
-    """Name and text of the value of each constant on a room's page."""
+    """Name and text of the value of each constant on a room's page; sets of names are none."""
     page = ast.parse((PACKAGE / room / "constants.py").read_text(encoding="utf-8"))
     return [
         (node.targets[0].id, ast.unparse(node.value))
         for node in page.body
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
+        if not isinstance(node.value, ast.Call)
     ]
 
 
@@ -74,6 +76,8 @@ def changed(value: str, how: str) -> str:
     factor = CHANGES[how]
     if isinstance(now, tuple):
         return repr(tuple(factor * x for x in now))
+    if isinstance(now, dict):
+        return repr({key: factor * x for key, x in now.items()})
     return repr(max(int(now * factor), 1) if isinstance(now, int) else factor * now)
 
 
