@@ -97,7 +97,7 @@ def test_a_replay_says_in_each_notice_how_deep_to_fly(shared_data: Path, tmp_pat
     (tmp_path / "gliderwatch.yml").write_text(f"""
 dockserver: {{roots: [{mission}], cache: [{mission / "cache"}]}}
 state: {{path: state.sqlite}}
-gliders: {{usf-sam: {{layers: {{max_depth: 60, outputs: out}}}}}}
+gliders: {{usf-sam: {{layers: {{sensor: sci_flbbcd_chlor_units, max_depth: 60, outputs: out}}}}}}
 channels: {{mail: {{url: "mailto://127.0.0.1:1?from=a@b.c&to=d@e.f"}}}}
 recipients: {{pilots: {{channels: [mail], min_severity: info, surfacing: [usf-sam]}}}}
 """)
@@ -107,4 +107,4 @@ recipients: {{pilots: {{channels: [mail], min_severity: info, surfacing: [usf-sa
     alerts = [json.loads(line) for line in (tmp_path / "results" / "alerts.jsonl").read_text().splitlines()]
     told = [alert["body"] for alert in alerts if "Fly next" in alert["body"]]
     assert len(told) >= 5
-    assert "temperature layer:" in told[-1]
+    assert "sci_flbbcd_chlor_units layer:" in told[-1]

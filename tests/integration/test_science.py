@@ -119,10 +119,29 @@ def test_what_the_science_file_measures_is_read_where_a_field_is_made_of_it(stat
     ]
     (station.parent / f"{OTHER}.cac").write_bytes(dinkum.sensor_list(wanted, OTHER))
     head = dinkum.header(NAME, crc=OTHER, n_held=3, filename_extension="tbd")
-    before = decode(station, [station.parent], science=True)
+    before = decode(station, [station.parent], science=())
     station.with_suffix(".tbd").write_bytes(head + dinkum.cycles(rows, wanted))
-    plain, whole = decode(station, [station.parent]), decode(station, [station.parent], science=True)
+    plain, whole = decode(station, [station.parent]), decode(station, [station.parent], science=())
     assert "temperature" not in plain.quantities
     assert whole.get("temperature").v == pytest.approx(9.0 + np.arange(1, 20), abs=1e-4)
     assert whole.get("science_pressure").v == pytest.approx(1e5)
     assert whole.completeness > before.completeness  # so that it takes the place of what came without it
+
+
+def test_a_sensor_of_the_science_computer_is_read_by_its_name(station: Path) -> None:
+    wanted = (*SCIENCE, ("sci_flbbcd_chlor_units", 4, "ug/l"))
+    rows = [
+        {
+            "sci_m_present_time": dinkum.OPENED_AT + 90.0 * i,
+            "sci_water_pressure": 1.0,
+            "sci_flbbcd_chlor_units": 0.5 + i,
+        }
+        for i in range(20)
+    ]
+    (station.parent / f"{OTHER}.cac").write_bytes(dinkum.sensor_list(wanted, OTHER))
+    head = dinkum.header(NAME, crc=OTHER, n_held=3, filename_extension="tbd")
+    station.with_suffix(".tbd").write_bytes(head + dinkum.cycles(rows, wanted))
+    plain = decode(station, [station.parent], science=())
+    whole = decode(station, [station.parent], science=("sci_flbbcd_chlor_units", "sci_not_sent"))
+    assert set(whole.quantities) - set(plain.quantities) == {"sci_flbbcd_chlor_units"}
+    assert whole.get("sci_flbbcd_chlor_units").v == pytest.approx(0.5 + np.arange(1, 20))

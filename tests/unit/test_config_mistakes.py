@@ -54,6 +54,11 @@ def problems(path: Path) -> list[str]:
         ("dockserver:\n  roots:\n  - /d\n  - 3", "4: dockserver.roots.1: must be text (put it in quotes)"),
         ("dockserver: 3", "1: dockserver: must be a section (`key: value` lines below it)"),
         ("- a", "1: must be a section (`key: value` lines below it)"),
+        (
+            MINIMAL + "gliders: {a: {layers: {max_depth: 9, min_depth: 1, sensor: temprature}}}",
+            "2: gliders.a.layers.sensor: is temperature, salinity, density, oxygen, or a name that begins with"
+            " sci_",
+        ),
         ("gliders: [electa]", "1: gliders: must be a section (`key: value` lines below it)"),
         (
             MINIMAL + "defaults: {zzzz: 1}",

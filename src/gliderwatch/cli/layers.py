@@ -121,14 +121,14 @@ def _near(mission: Path) -> tuple[Path, ...]:
 
 def _casts(mission: Path, caches: Sequence[Path], glider: str | None, sensor: str) -> list[tuple[Cast, ...]]:
     """The casts of each segment of one glider in a folder, in order of time; of copies the fullest."""
-    from gliderwatch.layers.water import casts_of
+    from gliderwatch.layers.water import casts_of, is_own
     from gliderwatch.slocum import folders
     from gliderwatch.slocum.decode import Decoder, decode_science
 
     paths = sorted(path for path in mission.rglob("*") if folders.is_science(path.name))
-    own = None if sensor in ("temperature", "salinity", "density", "oxygen") else sensor
+    own = [sensor] if is_own(sensor) else []
     best: dict[SegmentId, Segment] = {}
-    with Decoder(caches, decode=partial(decode_science, sensor=own)) as decoder:
+    with Decoder(caches, decode=partial(decode_science, science=own)) as decoder:
         for path, result in decoder.map(paths):
             if not isinstance(result, Segment):
                 click.echo(f"{path.name} left out: {result}", err=True)

@@ -18,7 +18,7 @@ from gliderwatch.messages.formatting import clean, utc
 from gliderwatch.model import Assessment, Flag, Incident, Segment, SegmentId
 from gliderwatch.service import judgement, transaction
 from gliderwatch.service.backlog import Job
-from gliderwatch.service.layers import layers_of, wants_science
+from gliderwatch.service.layers import layers_of, science_of
 from gliderwatch.service.liveness import PidLock, is_held
 from gliderwatch.service.runtime import OceanCache
 from gliderwatch.slocum import folders
@@ -214,7 +214,7 @@ def _fill(work: _Work, paths: Sequence[str], held: Sequence[SegmentId], on_step:
     steps.sort(key=_turn)
     ocean = OceanCache(work.config)
     with Decoder(caches, max_workers=2) as decoder:
-        decoder.science = wants_science(work.config)
+        decoder.science = science_of(work.config)
         results = decoder.map([Path(job.file.path) for _, job in steps if job is not None])
         for done, (identity, job) in enumerate(steps, 1):
             segment = _fuller(work, identity) if job is None else next(results)[1]

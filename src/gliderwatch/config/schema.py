@@ -6,7 +6,7 @@ from ipaddress import ip_address
 from typing import Annotated, Literal
 from zoneinfo import ZoneInfo
 
-from pydantic import AnyHttpUrl, Field, IPvAnyAddress, model_validator
+from pydantic import AnyHttpUrl, Field, IPvAnyAddress, field_validator, model_validator
 
 from gliderwatch.config.fields import (
     AbsolutePath,
@@ -235,8 +235,10 @@ class Layers(Section):
 
     Nothing is ever sent to a glider."""
 
-    sensor: Literal["temperature", "salinity", "density", "oxygen"] = Field(
-        default="temperature", description="The property whose layers are followed."
+    sensor: str = Field(
+        default="temperature",
+        description="The property whose layers are followed: `temperature`, `salinity`, `density`, `oxygen`,"
+        " or a science sensor by its name (`sci_...`).",
     )
     max_depth: Annotated[Number, Field(gt=0, le=1000)] = Field(
         description="The deepest that may be advised (m)."
@@ -261,6 +263,13 @@ class Layers(Section):
         default=None,
         description="Folder for the mission arguments `yo`, for a pilot to check and send; null: none.",
     )
+
+    @field_validator("sensor")
+    @classmethod
+    def _is_known(cls, sensor: str) -> str:
+        if sensor not in ("temperature", "salinity", "density", "oxygen") and not sensor.startswith("sci_"):
+            raise ValueError("is temperature, salinity, density, oxygen, or a name that begins with sci_")
+        return sensor
 
     @model_validator(mode="after")
     def _has_extent(self) -> Layers:

@@ -9,7 +9,14 @@ from gliderwatch.layers.casts import Cast, split
 from gliderwatch.layers.constants import LATITUDE
 from gliderwatch.model import EMPTY, Array, Segment, Series, readonly
 
+PROPERTIES = ("temperature", "salinity", "density", "oxygen")
+"""What is known of the water without a sensor's name."""
 _PA_PER_DBAR, _MS_CM_PER_S_M = 1e4, 10.0
+
+
+def is_own(name: str) -> bool:
+    """Whether a property is that of a sensor, by its own name and in its own unit."""
+    return name not in PROPERTIES
 
 
 def casts_of(segment: Segment, property_name: str) -> tuple[Cast, ...]:

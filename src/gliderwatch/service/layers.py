@@ -9,6 +9,7 @@ from pathlib import Path
 from gliderwatch.config import Config
 from gliderwatch.layers.advice import LayerAdvice, LayerParams, after
 from gliderwatch.layers.band import Method, Tracking
+from gliderwatch.layers.water import is_own
 from gliderwatch.model import SegmentId
 from gliderwatch.store.state_file import Store
 
@@ -39,9 +40,13 @@ def layers_of(config: Config, glider: str) -> GliderLayers | None:
     return GliderLayers(params, None if setting.outputs is None else Path(setting.outputs))
 
 
-def wants_science(config: Config) -> bool:
-    """Whether anything is to be made of science files: a field, or layers of a glider."""
-    return bool(config.fields) or any(glider.layers is not None for glider in config.gliders.values())
+def science_of(config: Config) -> tuple[str, ...] | None:
+    """The science sensors that gliders' layers name, besides the properties that are always read; None where
+    nothing is made of science files: neither fields, nor layers."""
+    sensors = {glider.layers.sensor for glider in config.gliders.values() if glider.layers is not None}
+    if not sensors and not config.fields:
+        return None
+    return tuple(sorted(name for name in sensors if is_own(name)))
 
 
 def learn(store: Store, identity: SegmentId, layers: GliderLayers) -> None:

@@ -22,7 +22,7 @@ from gliderwatch.params import GliderParams
 from gliderwatch.service import judgement, transaction
 from gliderwatch.service.backlog import Job
 from gliderwatch.service.fields import FleetField, fields_of
-from gliderwatch.service.layers import layers_of, wants_science
+from gliderwatch.service.layers import layers_of, science_of
 from gliderwatch.service.liveness import alive_path
 from gliderwatch.service.replay_files import (
     Log,
@@ -117,7 +117,7 @@ def replay(
             _check_glider(request, jobs, calls, report.store)
             report.coming = _coming(jobs, calls)
             order = ReplayOrder(jobs)
-            science = request.config is not None and wants_science(request.config)
+            science = None if request.config is None else science_of(request.config)
             for decoded in _decoded(jobs, [*cache_folders(request), lists.folder], workers, science):
                 for job, sent in order.after(decoded):
                     while calls and calls[0].sent <= sent:
@@ -264,7 +264,9 @@ def _check_glider(request: Request, jobs: Sequence[Job], calls: Iterable[Log], s
         raise GliderwatchError(f"no files of glider {request.glider}, but of: {', '.join(others)}")
 
 
-def _decoded(jobs: Sequence[Job], caches: Sequence[Path], workers: int, science: bool) -> Iterator[Job]:
+def _decoded(
+    jobs: Sequence[Job], caches: Sequence[Path], workers: int, science: Sequence[str] | None
+) -> Iterator[Job]:
     with Decoder(caches, max_workers=workers) as decoder:
         decoder.science = science
         results = decoder.map([Path(job.file.path) for job in jobs if job.result is None])

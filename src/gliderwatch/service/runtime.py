@@ -22,7 +22,7 @@ from gliderwatch.model import Segment
 from gliderwatch.sea.ocean_field import Field
 from gliderwatch.service.backlog import Backlog, Job
 from gliderwatch.service.fields import FleetField, fields_of
-from gliderwatch.service.layers import wants_science
+from gliderwatch.service.layers import science_of
 from gliderwatch.service.mail_pictures import MailPictures
 from gliderwatch.service.page_writer import PagesWritten
 from gliderwatch.service.relays import BatchesCame, RelayExchange, relay_settings
@@ -228,7 +228,7 @@ def build(
         pictures,
         relays,
     )
-    decoder.science = wants_science(config)
+    decoder.science = science_of(config)
     decoder.cache_folders = parts.cache_folders()
     return parts
 

@@ -136,21 +136,21 @@ _SCIENCE_TIME = "sci_m_present_time"
 _staging = cache(Staging)
 
 
-def decode(path: Path, cache_folders: Sequence[Path], *, science: bool = False) -> Segment:
+def decode(path: Path, cache_folders: Sequence[Path], *, science: Sequence[str] | None = None) -> Segment:
     """The segment that the file at `path` holds; of a cut or damaged file its intact part.
 
-    With `science` it has the quantities of the science file beside it too, if that is there by now.
+    With `science` it has the quantities of the science file beside it too, if that is there by now: those of
+    `sensors.SCIENCE`, and of the sensors named there, by their own names as they are sent.
 
     Raises `MissingCache` (a `Retry`) while the cache file of a factored header is in none of
     `cache_folders`, `Retry` for what may pass, `Quarantine` for a file that is no use as it is.
     """
-    wanted = (*SENSORS, *SCIENCE_SENSORS) if science else SENSORS
+    of_science = () if science is None else _with_own(science)
     try:
-        content = _content(path, cache_folders, TIME, wanted)
+        content = _content(path, cache_folders, TIME, (*SENSORS, *of_science))
         header, n_cycles, samples, digest = content.header, content.n_cycles, content.samples, content.digest
-        if n_cycles and (science or not tells_depth(samples)):
-            sensors = SCIENCE_SENSORS if science else PRESSURES[-1:]
-            beside = _science(path, header, cache_folders, sensors)
+        if n_cycles and (of_science or not tells_depth(samples)):
+            beside = _science(path, header, cache_folders, of_science or PRESSURES[-1:])
             if beside is not None:
                 n_cycles += beside.n_cycles  # with it the copy holds more
                 samples = {**beside.samples, **samples}
@@ -158,22 +158,31 @@ def decode(path: Path, cache_folders: Sequence[Path], *, science: bool = False) 
     except OSError as error:
         raise Retry(f"cannot be read: {error}") from error
     completeness = (folders.rank(header.kind), n_cycles, digest.hexdigest())
-    return build_segment(header, samples, completeness, content.damaged, science=science)
+    segment = build_segment(header, samples, completeness, content.damaged, science=science is not None)
+    return _own(segment, samples, science or ())
 
 
-def decode_science(path: Path, cache_folders: Sequence[Path], *, sensor: str | None = None) -> Segment:
+def decode_science(path: Path, cache_folders: Sequence[Path], *, science: Sequence[str] = ()) -> Segment:
     """What the science file at `path` holds, without the flight file beside it: the quantities of
-    `sensors.SCIENCE`, and one `sensor` more, by its own name as it is sent. Raises as `decode`."""
-    wanted = SCIENCE_SENSORS if sensor is None or sensor in SCIENCE_SENSORS else (*SCIENCE_SENSORS, sensor)
+    `sensors.SCIENCE`, and of the sensors named in `science`. Raises as `decode`."""
     try:
-        content = _content(path, cache_folders, _SCIENCE_TIME, wanted, science=True)
+        content = _content(path, cache_folders, _SCIENCE_TIME, _with_own(science), science=True)
     except OSError as error:
         raise Retry(f"cannot be read: {error}") from error
     completeness = (folders.rank(content.header.kind), content.n_cycles, content.digest.hexdigest())
     segment = build_segment(content.header, content.samples, completeness, content.damaged, science=True)
-    if sensor is None or sensor not in content.samples:
-        return segment
-    return replace(segment, quantities={**segment.quantities, sensor: cleaned(content.samples[sensor])})
+    return _own(segment, content.samples, science)
+
+
+def _with_own(science: Sequence[str]) -> tuple[str, ...]:
+    """The sensors of `sensors.SCIENCE` and those named, each once."""
+    return (*SCIENCE_SENSORS, *(name for name in science if name not in SCIENCE_SENSORS))
+
+
+def _own(segment: Segment, samples: Samples, science: Sequence[str]) -> Segment:
+    """The segment with the sensors named, as far as they were sent, by their own names and in their units."""
+    own = {name: cleaned(samples[name]) for name in science if name in samples}
+    return replace(segment, quantities={**segment.quantities, **own}) if own else segment
 
 
 @dataclass(frozen=True, slots=True)
@@ -295,7 +304,7 @@ def _dbdreader() -> ModuleType:
 # --------------------------------------------------------------------------- worker processes
 
 Decode = Callable[..., Segment]
-"""Of a path and cache folders, as `decode`; with `science=True` only where that is wanted."""
+"""Of a path and cache folders, as `decode`; with `science` only where that is wanted."""
 
 
 class Decoder:
@@ -318,8 +327,8 @@ class Decoder:
         self._max_workers, self._timeout, self._memory, self._decode = max_workers, timeout, memory, decode
         self._scratch = Scratch()
         self._lock = Lock()
-        self.science = False
-        """Whether segments are to have what their science files hold."""
+        self.science: Sequence[str] | None = None
+        """As in `decode`: None where segments are not to have what their science files hold."""
         self._closed = False
         self._pending: set[Future[Segment]] = set()
         # Workers inherit it; nothing here gains from threads of linear algebra.
@@ -338,7 +347,7 @@ class Decoder:
         The future is cancelled when the decoder is closed first. Raises `RuntimeError` after that.
         """
         seconds = self._timeout + _megabytes(path)
-        decode = partial(self._decode, science=True) if self.science else self._decode
+        decode = self._decode if self.science is None else partial(self._decode, science=tuple(self.science))
         args = (decode, path, self.cache_folders, seconds)
         outer: Future[Segment] = Future()
         with self._lock:
