@@ -56,8 +56,8 @@ def problems(path: Path) -> list[str]:
         ("- a", "1: must be a section (`key: value` lines below it)"),
         (
             MINIMAL + "gliders: {a: {layers: {max_depth: 9, min_depth: 1, sensor: temprature}}}",
-            "2: gliders.a.layers.sensor: is temperature, salinity, density, oxygen, or a name that begins with"
-            " sci_",
+            "2: gliders.a.layers.sensor: is temperature, salinity, density, oxygen, or a name"
+            " that begins with sci_",
         ),
         ("gliders: [electa]", "1: gliders: must be a section (`key: value` lines below it)"),
         (
