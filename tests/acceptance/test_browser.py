@@ -22,6 +22,7 @@ import pytest
 from gliderwatch.figures.coast import world
 from gliderwatch.messages.samples import SAMPLES
 from gliderwatch.model import Kind
+from gliderwatch.pages.guide import guide_page
 from gliderwatch.pages.render import Frame, fleet_page, glider_page, sheet_page
 from gliderwatch.pages.view import GliderView
 from unit.test_pages import LATE, NOW, aborted, incident, view
@@ -191,6 +192,14 @@ def test_a_page_marks_itself_stale_where_scripts_run(served: Served) -> None:
     still = served.look("index.html", PHONE, scripts=False)
     assert not still["stale"]
     assert "stale at 22:28" in (served.folder / "index.html").read_text().replace("\n", " ")
+
+
+def test_the_guide_and_the_daily_sheet_fit_on_paper(served: Served, tmp_path: Path) -> None:
+    (served.folder / "pilots.html").write_text(guide_page())
+    for page, most in (("pilots.html", 2), ("electa-sheet.html", 1)):
+        url, paper = f"http://127.0.0.1:{served.port}/{page}", tmp_path / "paper.pdf"
+        browse(f"--print-to-pdf={paper}", "--no-pdf-header-footer", url)
+        assert len(re.findall(rb"/Type /Page\b", paper.read_bytes())) == most, page
 
 
 AXE = Path(__file__).parents[2] / "build" / "axe" / "axe.min.js"

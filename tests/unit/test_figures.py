@@ -123,6 +123,22 @@ def test_no_map_is_long(places):
     assert len(chart.svg(chart.Chart("", marks=marks), coast.world())) < 50_000
 
 
+def test_no_label_of_an_area_stands_on_another():
+    """A glider adrift: now, and in some hours."""
+    areas = tuple(
+        (DriftEllipse(38.7 + 0.002 * k, -62.2, 9e3 + 200.0 * k, 6e3, 60.0), "area", f"+{k} h")
+        for k in range(5)
+    )
+    labels = re.findall(
+        r'<text class="halo faint" x="([\d.]+)" y="([\d.]+)"[^>]*>\+',
+        chart.svg(chart.Chart("m", areas=areas), coast.world()),
+    )
+    spots = [(float(x), float(y)) for x, y in labels]
+    assert 2 <= len(spots) < len(areas)
+    for k, (x, y) in enumerate(spots):
+        assert all(abs(x - u) > 30 or abs(y - v) > 12 for u, v in spots[:k])
+
+
 def test_the_outline_of_an_ellipse_has_its_axes():
     area = DriftEllipse(40.0, -70.0, 9000.0, 3000.0, 30.0)
     x = to_plane(*np.array(chart.outline(area)).T, 40.0, -70.0)

@@ -347,7 +347,7 @@ def test_a_page_answers_what_a_pilot_asks():
         "Next call 15 Nov 01:13 ± 29 min",
         "in 3.0 h",
         "leak",
-        "sudo -u gliderwatch gliderwatch ack electa/anomaly/1",
+        "sudo -u gliderwatch gliderwatch ack electa",
         message.title,
     ):
         assert words in text, words

@@ -49,6 +49,14 @@ def test_values_stand_where_they_belong():
     assert y0 < y1
 
 
+def test_no_number_of_an_axis_is_cut_off():
+    line = Line("x", np.arange(4.0) * DAY, np.array([0.0005, -0.0076, 0.0002, -0.0002]))
+    svg = ET.fromstring(panel_svg.svg(Panel("x", "v (1)", "", (line,))))
+    numbers = [t for t in svg.iter("text") if re.fullmatch(r"-?[\d.]+", t.text or "")]
+    assert "-0.0025" in {t.text for t in numbers}
+    assert all(float(t.get("x")) >= 6.0 * len(t.text) for t in numbers)
+
+
 def test_a_panel_of_another_time_shows_its_axes_alone():
     text = panel_svg.svg(dives.speed(some_dives()), (0.0, DAY))
     assert "M" in text and 'class="dots' not in text.partition("<g")[0]

@@ -39,6 +39,8 @@ STEPS = (30.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 1 / 6, 1 / 12, 1 / 30, 1 / 60)
 ARROW = 300.0
 """Units of the picture for a current of 1 m/s, if the greatest one is not longer than `LONGEST`."""
 LONGEST = 45.0
+ROOM = (34.0, 13.0)
+"""Units of the picture, across and down, between the labels of two areas."""
 STYLE = """\
 .map{background:var(--sea);font:12px system-ui,sans-serif}.map text{fill:var(--ink)}
 .map .land{fill:var(--land);stroke:var(--shore);stroke-width:.8}
@@ -180,7 +182,7 @@ def svg(chart: Chart, land: Land) -> str:
         *_finer(view, land),
         *_depths(view, land),
         *_graticule(view),
-        *(_area(view, *area) for area in chart.areas),
+        *_areas(view, chart.areas),
         *_tracks(view, chart),
         *_currents(view, chart.arrows),
         *_marks(view, chart.marks),
@@ -284,12 +286,19 @@ def _tracks(view: Frame, chart: Chart) -> Iterable[str]:
             yield f'<path class="track {escape(colour)}" d="{_line(view, track)}"/>'
 
 
-def _area(view: Frame, area: DriftEllipse, kind: str, label: str) -> str:
-    xy = view.xy(*np.array(outline(area)).T)
-    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in xy.tolist())
-    top = xy[np.argmin(xy[:, 1])]
-    text = panel_svg.text(top[0], top[1] - 4, label, "middle", "halo faint") if label else ""
-    return f'<polygon class="{escape(kind)}" points="{points}"><title>{escape(label)}</title></polygon>{text}'
+def _areas(view: Frame, areas: Sequence[tuple[DriftEllipse, str, str]]) -> Iterable[str]:
+    """Ellipses, each with its label above or below it; without where another's is there."""
+    taken: list[tuple[float, float]] = []
+    for area, kind, label in areas:
+        xy = view.xy(*np.array(outline(area)).T)
+        points = " ".join(f"{x:.1f},{y:.1f}" for x, y in xy.tolist())
+        yield f'<polygon class="{escape(kind)}" points="{points}"><title>{escape(label)}</title></polygon>'
+        (top_x, top_y), (low_x, low_y) = xy[np.argmin(xy[:, 1])], xy[np.argmax(xy[:, 1])]
+        for x, y in ((float(top_x), float(top_y) - 4), (float(low_x), float(low_y) + 12)):
+            if label and all(abs(x - u) > ROOM[0] or abs(y - v) > ROOM[1] for u, v in taken):
+                taken.append((x, y))
+                yield panel_svg.text(x, y, label, "middle", "halo faint")
+                break
 
 
 def _currents(view: Frame, arrows: Sequence[Arrow]) -> Iterable[str]:

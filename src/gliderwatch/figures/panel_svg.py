@@ -20,8 +20,8 @@ from gliderwatch.model import Array
 WIDTH, HEIGHT = 340.0, 156.0
 """Of a panel in its own units: the width of a phone, so that text there is as large as it says."""
 LEFT, RIGHT, TOP, BOTTOM = 40.0, 8.0, 30.0, 20.0
-CHAR = 5.9
-"""Units that a character of the legend takes, about."""
+CHAR, DIGIT = 5.9, 6.4
+"""Units that a character of the legend takes, about, and one of a number at the most."""
 HOUR, DAY = 3600.0, 86400.0
 TIME_STEPS = tuple(x * HOUR for x in (1, 2, 3, 6, 12, 24, 48, 120, 240, 480, 720, 1440, 2880, 8760))
 """Seconds between two times on the axis."""
@@ -42,17 +42,19 @@ _SHAPES = ("M0-5L5 4L-5 4z", "M0-5L5 0L0 5L-5 0z")
 
 @dataclass(frozen=True, slots=True)
 class _Scale:
-    """From times (s) and values to the picture: the box of both that it shows; ``down``: values grow down."""
+    """From times (s) and values to the picture: the box of both that it shows; ``down``: values grow down.
+    ``left``: where it begins, behind the numbers of the axis."""
 
     start: float
     end: float
     low: float
     high: float
     down: bool
+    left: float
 
     def x(self, t: Array | float) -> Array:
         part: Array = (np.asarray(t, float) - self.start) / (self.end - self.start)
-        return LEFT + part * (WIDTH - LEFT - RIGHT)
+        return self.left + part * (WIDTH - self.left - RIGHT)
 
     def y(self, v: Array | float) -> Array:
         part: Array = (np.clip(np.asarray(v, float), self.low, self.high) - self.low) / (self.high - self.low)
@@ -85,7 +87,8 @@ def _scale(panel: Panel, span: tuple[float, float] | None) -> _Scale:
     bounds = panel.bounds(0.1)
     if bounds is None:
         raise ValueError(f"{panel.name} has no value to show")
-    return _Scale(start, max(end, start + HOUR), *bounds, panel.down)
+    longest = max(len(f"{v:g}") for v in ticks(*bounds))
+    return _Scale(start, max(end, start + HOUR), *bounds, panel.down, max(LEFT, 8 + DIGIT * longest))
 
 
 # ----------------------------------------
@@ -125,12 +128,12 @@ def _axes(panel: Panel, scale: _Scale) -> Iterator[str]:
     bottom = HEIGHT - BOTTOM
     for v in ticks(scale.low, scale.high):
         y = float(scale.y(v))
-        yield f'<path class="grid" d="M{LEFT:g} {y:.1f}H{WIDTH - RIGHT:g}"/>'
-        yield text(LEFT - 4, y + 4, f"{v:g}", "end")
+        yield f'<path class="grid" d="M{scale.left:g} {y:.1f}H{WIDTH - RIGHT:g}"/>'
+        yield text(scale.left - 4, y + 4, f"{v:g}", "end")
     for t, label in times(scale.start, scale.end):
         x = float(scale.x(t))
         yield f'<path class="grid" d="M{x:.1f} {TOP:g}V{bottom:g}"/>'
-        if LEFT - 2 <= x <= WIDTH - RIGHT - 34:  # the name of the axis stands at its end
+        if scale.left - 2 <= x <= WIDTH - RIGHT - 34:  # the name of the axis stands at its end
             yield text(x, HEIGHT - 6, label, "middle")
     yield text(WIDTH - RIGHT, HEIGHT - 6, "UTC", "end", "faint")
     yield text(2, 11, panel.unit, "start", "faint")

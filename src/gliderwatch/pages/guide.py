@@ -17,7 +17,7 @@ _PAGE = """<!DOCTYPE html>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta http-equiv="Content-Security-Policy" content="{policy}">
 <title>What to do: gliderwatch</title><style>{style}</style></head>
-<body><main><p><a href="index.html">All gliders</a></p>
+<body><main class="guide"><p><a href="index.html">All gliders</a></p>
 {body}</main></body></html>
 """
 _ELSEWHERE = re.compile(r"\[([^\]]+)\]\((?!https?:|#)[^)]*\)")
