@@ -353,6 +353,17 @@ def test_a_page_answers_what_a_pilot_asks():
         assert words in text, words
 
 
+def test_a_glider_not_heard_for_years_is_nowhere_and_nothing_is_to_be_done():
+    message = replace(SAMPLES[Kind.ANOMALY](NOW), incident="electa/anomaly/1")
+    one = replace(view(incidents=(incident(),), alerts=(message,)), now=NOW + 900 * 86400.0)
+    page = glider_page(one, Frame(one.now, one.now + 900, live="events"), world())
+    assert one.is_over and one.whereabouts() is None
+    words = " ".join(" ".join(Seen(page).text).split())
+    assert "OVER" in words and "Last fix" in words
+    assert "Now about" not in words and '<div class="do">' not in page
+    assert "daily sheet explore" in words  # one link beside the other
+
+
 def test_an_acknowledgement_is_seen():
     one = incident()
     acks = {one.id: acknowledge(one, "Ann", "on it", NOW)}

@@ -196,7 +196,7 @@ def where(
 
     from gliderwatch.export import ais as virtual
     from gliderwatch.export.dives import iso
-    from gliderwatch.messages.formatting import clean, place
+    from gliderwatch.messages.formatting import clean, place, utc
 
     if ais is not None and glider is None:
         raise click.UsageError("--ais is of one glider: name it")
@@ -219,7 +219,9 @@ def where(
         return
     for view, area in found:
         if area is None:
-            click.echo(f"{clean(view.name)}: no position is known")
+            heard = f"; last heard {utc(view.last_sign)}" if view.last_sign is not None else ""
+            fix = f", at {place(view.fix.lat, view.fix.lon)}" if heard and view.fix is not None else ""
+            click.echo(f"{clean(view.name)}: no position is known now{heard}{fix}")
         elif ais is not None:
             click.echo("\n".join(virtual.lines(view.name, area, ais, view.now)))
         else:

@@ -51,8 +51,8 @@ def message_of(alert: Alert) -> Message:
 
 def actions(view: GliderView) -> Message | None:
     """The newest message that says what to do about the worst of what goes on; None: nothing does, or nothing
-    goes on."""
-    for matter in view.open_matters:
+    goes on, or its deployment is over."""
+    for matter in () if view.is_over else view.open_matters:
         for alert in view.alerts:
             if alert.incident.rstrip("+") == matter.id and (found := message_of(alert)).do:
                 return found

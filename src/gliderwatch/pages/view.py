@@ -113,7 +113,10 @@ class GliderView:
         return any(m.kind is Kind.ABORT and m.over is None for m in self.matters)
 
     def whereabouts(self, ahead: float = 0.0) -> DriftEllipse | None:
-        """Where it is with 95 %, so many seconds from now; one that is adrift drifts from its last fix."""
+        """Where it is with 95 %, so many seconds from now; one that is adrift drifts from its last fix. None
+        where nothing is known, of a glider out of the water, and of one not heard for a month."""
+        if self.is_over or self.attention.recovered:
+            return None
         fix, expected = self.fix, self.expected
         place = (fix.lat, fix.lon) if fix is not None else None
         due = self.awaited.due if self.awaited is not None else None

@@ -50,11 +50,11 @@ class VirtualAis:
     def _lines(self, config: Config, now: float) -> Iterator[str]:
         known = set(self._store.gliders())
         for name, glider in config.gliders.items():
-            if glider.mmsi is None or name not in known or glider.recovered:
+            if glider.mmsi is None or name not in known:
                 continue
             view = read_glider(self._store, name, config.attention(name), now, dives=1, whole=False)
             area = view.whereabouts()
-            if area is not None and not view.is_over:
+            if area is not None:
                 yield from ais.lines(name, area, glider.mmsi, now)
 
     def _give_out(self, config: Config, lines: list[str]) -> None:
