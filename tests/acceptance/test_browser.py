@@ -23,8 +23,9 @@ from gliderwatch.figures.coast import world
 from gliderwatch.messages.samples import SAMPLES
 from gliderwatch.model import Kind
 from gliderwatch.pages.guide import guide_page
-from gliderwatch.pages.render import Frame, fleet_page, glider_page, sheet_page
+from gliderwatch.pages.render import Frame, field_page, fleet_page, glider_page, sheet_page
 from gliderwatch.pages.view import GliderView
+from unit.test_field_page import view as field_view
 from unit.test_pages import LATE, NOW, aborted, incident, view
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -146,6 +147,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     (folder / "electa.html").write_text(glider_page(fleet()[0], frame, world()))
     (folder / "electa-sheet.html").write_text(sheet_page(fleet()[0], frame, world()))
     fresh = Frame(NOW, time.time() + 3600.0)
+    (folder / "field.upper.html").write_text(field_page(field_view(), frame, world()))
     (folder / "fresh.html").write_text(fleet_page(fleet(), fresh, world()))
     with serving(folder) as served:
         yield served
@@ -212,7 +214,7 @@ axe.run(document.querySelector("main")).then(function (found) {
 
 
 @pytest.mark.skipif(not AXE.exists(), reason="no axe-core: .ci/run fetches it where npm is")
-@pytest.mark.parametrize("page", ["index.html", "electa.html", "electa-sheet.html"])
+@pytest.mark.parametrize("page", ["index.html", "electa.html", "electa-sheet.html", "field.upper.html"])
 def test_axe_finds_nothing_that_shuts_anybody_out(served: Served, page: str) -> None:
     shutil.copy(AXE, served.folder)
     text = re.sub(r'<meta http-equiv="Content-[^>]*>', "", (served.folder / page).read_text())
