@@ -41,7 +41,7 @@ TESTS = {
     "forecast": "unit/test_heuristics_forecast unit/test_kalman_expected_flow unit/test_forecast_steering"
     " unit/test_forecast_surfacing unit/test_forecast_timing unit/test_forecast_waypoints"
     " property/test_forecast",
-    "health": "unit/test_health_rules unit/test_health_incidents",
+    "health": "unit/test_heuristics_health unit/test_health_rules unit/test_health_incidents",
     "incidents": "unit/test_heuristics_incidents unit/test_notifications unit/test_state_machine"
     " unit/test_overdue unit/test_unjudged unit/test_send_schedule",
 }
