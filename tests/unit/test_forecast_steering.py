@@ -1,9 +1,10 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from gliderwatch.forecast.steering import WAYS, Plan, courses, steered
+from gliderwatch.forecast.steering import WAYS, Leg, Plan, courses
 
 EAST, NORTH = np.array([1.0, 0.0]), np.array([0.0, 1.0])
 STILL = np.zeros(2)
@@ -12,8 +13,8 @@ AT, AGAINST = WAYS.index("at the waypoint"), WAYS.index("at the waypoint against
 BEFORE, BESIDE = WAYS.index("as before"), WAYS.index("beside the waypoint")
 
 
-def plan(goals=(), heading=EAST, bearing=None, length=1.0, current=STILL, speed=0.25):
-    return Plan(heading, bearing, length, np.asarray(current), speed, tuple(map(np.asarray, goals)))
+def plan(goals=(), heading=EAST, bearing=None, length=1.0, current=STILL, speed=0.25, legs=()):
+    return Plan(heading, bearing, length, np.asarray(current), speed, tuple(map(np.asarray, goals)), legs)
 
 
 def test_without_a_waypoint_all_goes_on_as_before():
@@ -69,26 +70,56 @@ def test_a_glider_carried_backwards_never_arrives():
     assert course.heading == pytest.approx([0, 1])
 
 
-@pytest.mark.parametrize("hours", range(0, 24, 3))
-def test_a_course_is_found_again_whatever_the_tide_was(hours):
-    """No waypoint is sent: the glider holds 60 degrees in a tide of 0.15 m/s, and will on the next dive."""
-    tide = [0.15 * np.array([math.cos(k), math.sin(k)]) for k in (0.5 * hours, 0.5 * hours + 1.5)]
-    goal = 1e7 * np.array([math.cos(1.05), math.sin(1.05)])
-    flown, next_ = (courses(plan([goal], current=c), 3 * HOUR)[AGAINST].heading for c in tide)
-    course = steered(0.9 * flown, 0.25, tide[0], None)
-    assert course == pytest.approx(1.05, abs=0.02)
-    made = courses(plan(heading=flown, bearing=course, current=tide[1]), 3 * HOUR)
-    assert made[AGAINST].heading == pytest.approx(next_, abs=0.03)
-    assert made[BEFORE].heading == pytest.approx(flown)
+def flown_to(goal, tides, place=(0.0, 0.0), speed=0.25):
+    """Legs of 90 min to a goal (m), each against the tide (m/s) that the glider knew and was carried by, and
+    where the last one ended (m)."""
+    legs, here = [], np.array(place)
+    for tide in map(np.asarray, tides):
+        heading = courses(plan([goal - here], current=tide, speed=speed), 1.5 * HOUR)[AGAINST].heading
+        angle = math.atan2(heading[1], heading[0])
+        legs.append(Leg(tuple(here), angle, tuple(tide), speed, 1.5 * HOUR))
+        here = here + 1.5 * HOUR * (speed * heading + tide)
+    return legs, here
 
 
-@pytest.mark.parametrize("angle", range(0, 360, 45))
-def test_in_a_current_stronger_than_the_glider_the_course_before_tells_which(angle):
-    current = 0.4 * np.array([math.cos(math.radians(angle)), math.sin(math.radians(angle))])
-    goal = 1e7 * np.array([math.cos(1.05), math.sin(1.05)])
-    flown = courses(plan([goal], current=current), 3 * HOUR)[AGAINST].heading
-    assert steered(flown, 0.25, current, 1.1) == pytest.approx(1.05, abs=0.05)
+def from_here(legs, here):
+    return tuple(replace(leg, place=tuple(np.array(leg.place) - here)) for leg in legs)
 
 
-def test_a_circle_has_no_course():
-    assert steered(0.1 * EAST, 0.25, STILL, None) is None
+@pytest.mark.parametrize("amplitude", [0.1, 0.2, 0.4])
+def test_a_goal_that_is_not_sent_is_found_by_the_headings_whatever_the_tide(amplitude):
+    """It aims otherwise on each leg, and from another place, as the tide carries it about."""
+    tides = [amplitude * np.array([math.cos(0.8 * k), math.sin(0.8 * k)]) for k in range(17)]
+    goal = np.array([1.2e4, 2e4])
+    legs, here = flown_to(goal, tides[:16])
+    sent = courses(plan([goal - here], current=tides[16]), 1.5 * HOUR)[AGAINST].heading
+    made = courses(plan(heading=EAST, current=tides[16], legs=from_here(legs, here)), 1.5 * HOUR)
+    assert made[AGAINST].heading == pytest.approx(sent, abs=0.12)
+    assert made[BEFORE].heading == pytest.approx(EAST)
+
+
+def test_after_a_turn_the_new_goal_counts_within_a_dive():
+    """12 legs to the east, then a dive (2 legs) to the north."""
+    east, here = flown_to(np.array([4e4, 0.0]), [STILL] * 12)
+    north, end = flown_to(here + np.array([0.0, 4e4]), [STILL] * 2, here)
+    made = courses(plan(heading=NORTH, legs=from_here([*east, *north], end)), 3 * HOUR)
+    assert made[AGAINST].heading[1] > 0.8
+    assert abs(made[AGAINST].heading[0]) < 0.2
+
+
+def test_where_it_may_arrive_the_rest_of_the_way_is_not_known():
+    """Bearings from two sides show a goal 3 km away; a dive would lead 2.7 km beyond."""
+    legs = [
+        Leg((x, y), math.atan2(-y, 3e3 - x), (0.0, 0.0), 0.25, 1.5 * HOUR)
+        for x, y in 2 * [(0.0, 0.0), (3e3, 3e3), (3e3, -3e3), (6e3, 0.0), (-1e3, 2e3)]
+    ]
+    near = courses(plan(legs=tuple(legs)), 6 * HOUR)[AGAINST]
+    far = courses(plan(legs=tuple(legs)), 1 * HOUR)[AGAINST]
+    assert near.unknown > 0.3
+    assert far.unknown < 0.05
+    assert far.heading[0] > 0.9
+
+
+def test_without_legs_it_goes_on_as_before():
+    made = courses(plan(heading=0.9 * NORTH, legs=()), 3 * HOUR)
+    assert made[AGAINST].heading == pytest.approx([0, 0.9])

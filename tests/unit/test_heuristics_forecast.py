@@ -10,7 +10,7 @@ from gliderwatch.estimation.adaptive import Learner
 from gliderwatch.estimation.glider import Estimate
 from gliderwatch.forecast import timing
 from gliderwatch.forecast.outlook import look_ahead
-from gliderwatch.forecast.steering import Plan, courses
+from gliderwatch.forecast.steering import Leg, Plan, courses
 from gliderwatch.forecast.surfacing import (
     Surfacings,
     active_waypoint,
@@ -198,6 +198,30 @@ class TestSteering:
         """A current that is faster than the glider."""
         plan = Plan(np.array([0.0, 1.0]), None, 1.0, np.array([0.3, 0.0]), 0.2, (np.array([0.0, 1e5]),))
         assert courses(plan, 1000.0)[3].heading == pytest.approx([-0.8, 0.6])
+
+    def test_eight_dives_show_where_a_glider_heads_that_sends_no_waypoint(self):
+        """Two legs each, of which every one is longer than the glider circled."""
+        state = replace(NORTH, heading=(0.0, 1.0), speed=SPEED, current=(0.0, 0.0))
+        for k in range(1, 11):
+            state = learn(state, dive(k, Way(heading=0.5, flow=(0.0, 0.0)), start=state.fix), None)
+        assert len(state.legs) == 16
+        assert [leg.heading for leg in state.legs] == pytest.approx([0.5] * 16)
+        assert sum(leg.time for leg in state.legs[-2:]) == pytest.approx(3 * HOUR, rel=0.01)
+        assert learn(state, dive(11, Way(), start=state.fix), (LAT, LON)).legs == ()
+
+    def unsent(self, off: float, legs: int = 2) -> float:
+        """The heading (rad) made of legs to the east of which the last is `off` (rad)."""
+        flown = (Leg((0.0, 0.0), off if k == legs - 1 else 0.0, (0.0, 0.0), SPEED, HOUR) for k in range(legs))
+        course = courses(Plan(np.array([1.0, 0.0]), None, 1.0, np.zeros(2), SPEED, legs=tuple(flown)), HOUR)
+        return math.atan2(course[3].heading[1], course[3].heading[0])
+
+    def test_a_heading_is_good_to_a_tenth_of_a_radian(self):
+        """Headings of 0 and 0.3 rad are of one goal between them, those of 0 and 0.8 of two."""
+        assert self.unsent(0.3) == pytest.approx(0.15, abs=0.02)
+        assert self.unsent(0.8) > 0.45
+
+    def test_one_heading_aside_after_many_is_no_new_goal_yet(self):
+        assert self.unsent(1.5, legs=8) == pytest.approx(0.39, abs=0.05)
 
     def test_where_all_ways_were_alike_the_waypoint_is_followed_rather(self):
         """Two of the ways go on to the east as before, two go to the waypoint in the north."""

@@ -80,11 +80,24 @@ WORST_COURSE = 2.0
 """Greatest square of the error of a course that counts: that of one at a right angle."""
 STEADY_HEADING = 0.3
 """Length of the mean heading vector from which the speed of a dive shows."""
-FAR = 1e6
-"""m to the goal of a course of which no waypoint is known: no dive reaches it."""
-HEADING_ERROR, COURSE_CHANGE = 0.1, 0.5
-"""rad: how well the mean heading of a dive shows how it was steered, and by how much a course usually differs
-from the one before, on the same leg; beyond that it is a new leg."""
+HEADING_ERROR = 0.1
+"""rad: how well the mean heading of half a dive shows how it was steered."""
+ANY_HEADING = 0.005
+"""Likelihood of any other heading, beside 1 of the one that leads to the goal: a turn, a pilot's command."""
+NEW_GOAL = 0.05
+"""Chance of a new goal on half a dive: a leg of some ten dives, a day."""
+LEGS_KEPT = 16
+"""Halves of dives whose headings show where a glider heads: two days of dives of 3 h."""
+GOAL_BEARINGS = 48
+"""Bearings all around at which a goal is thought of,"""
+GOAL_DISTANCES = (2e3, 60e3)
+"""m: and the nearest and the farthest: nearer ones are reached within a dive, farther ones look alike,"""
+GOAL_RINGS = 8
+"""with so many of them, in proportion."""
+GOAL_REACHED = 1000.0
+"""m from a goal at which a glider turns to the next one."""
+LEG_STEPS = 2
+"""Steps of a leg after which a glider that was carried aside aims anew: 45 min of dives of 3 h."""
 MOST_ALLOWANCE = 0.8
 """Sine of the angle that allowance for a current takes at most."""
 FLOORS = (0.03, 0.01, 0.01, 0.01)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 
@@ -26,6 +26,7 @@ from gliderwatch.forecast.constants import (
     GPS_ERROR,
     HABIT_DIVES,
     INTERVALS_KEPT,
+    LEGS_KEPT,
     LONG_DRIFT,
     MISSES_KEPT,
     MISSES_MEMORY,
@@ -41,11 +42,11 @@ from gliderwatch.forecast.constants import (
     WILD_CHANGE,
     WORST_COURSE,
 )
-from gliderwatch.forecast.steering import AGAINST, WAYS, Plan, courses, steered
+from gliderwatch.forecast.steering import UNSENT, WAYS, Leg, Plan, courses
 from gliderwatch.forecast.timing import quantile
 from gliderwatch.model import Array, Dive, Fix, NextSurfacing, Segment, Unusable
 from gliderwatch.navigation.flight import joined
-from gliderwatch.navigation.geodesy import displacement, from_plane
+from gliderwatch.navigation.geodesy import displacement, from_plane, to_plane
 
 # ----------------------------------------
 # What is remembered of past surfacings, and what follows from it for the way ahead.
@@ -65,9 +66,9 @@ class Surfacings:
     ``drift`` (m/s) in them beside the current. ``heading`` the mean vector of the last dive (None: not
     seen yet), ``lengths`` those of the last ones; ``speed`` (m/s) that the glider believes; ``current``
     (m/s) of the last dive, ``change`` ((m/s)2, a component) the mean square of its changes;
-    ``bearing`` (rad) of the waypoint when that dive began, else of the course that it steered.
-    ``waypoints`` in order, the present one last; ``scores`` of the ways of steering, mean square errors of
-    their courses; ``misses``, see `factor`.
+    ``bearing`` (rad) of the waypoint when that dive began. ``waypoints`` in order, the present one last;
+    ``scores`` of the ways of steering, mean square errors of their courses; ``misses``, see `factor`;
+    ``legs`` the last ones where no waypoint was ever sent, their places in degrees (latitude, longitude).
     """
 
     fix: Fix | None = None
@@ -85,6 +86,7 @@ class Surfacings:
     waypoints: tuple[Place, ...] = ()
     scores: tuple[float, ...] = (DOUBT,) * len(WAYS)
     misses: tuple[float, ...] = ()
+    legs: tuple[Leg, ...] = ()
 
 
 def is_same(a: Place, b: Place) -> bool:
@@ -114,7 +116,16 @@ def bearing(state: Surfacings) -> float | None:
 def plan(state: Surfacings, speed: float, current: Vector) -> Plan:
     """What the glider knows of its way: it reckons with a speed and a current (m/s)."""
     heading, length = np.array(state.heading or (0.0, 0.0)), max(state.lengths, default=1.0)
-    return Plan(heading, state.bearing, length, np.array(current), speed, goals(state))
+    return Plan(heading, state.bearing, length, np.array(current), speed, goals(state), _legs_from(state))
+
+
+def _legs_from(state: Surfacings) -> tuple[Leg, ...]:
+    """The legs, with places in m from the fix; none where a waypoint is known."""
+    if state.fix is None or state.waypoints or not state.legs:
+        return ()
+    lat, lon = np.array([leg.place for leg in state.legs]).T
+    places = to_plane(lat, lon, state.fix.lat, state.fix.lon).tolist()
+    return tuple(replace(leg, place=(x, y)) for leg, (x, y) in zip(state.legs, places, strict=True))
 
 
 def factor(misses: Sequence[float]) -> float:
@@ -178,13 +189,24 @@ def learn(
         waypoints=_waypoints(state.waypoints, waypoint),
         fix=end,
     )
-    if after.bearing is None and state.current is not None and state.speed is not None:
-        flown = _flown(after, dive).heading if dive.track is not None else None
-        course = None
-        if flown is not None:
-            course = steered(np.array(flown), state.speed, np.array(state.current), state.bearing)
-        after = replace(after, bearing=course)
+    after = replace(after, legs=() if after.waypoints else (*state.legs, *_halves(state, dive))[-LEGS_KEPT:])
     return _driven(_adrift(_flown(after, dive), state.fix, dive), dive)
+
+
+def _halves(state: Surfacings, dive: Dive) -> Iterator[Leg]:
+    """The two halves of a dive as legs; none where it circled, or where it is not known what the glider
+    reckoned with."""
+    if dive.track is None or dive.start is None or state.current is None or state.speed is None:
+        return
+    track, n = dive.track, len(dive.track.heading)
+    middle = int(np.searchsorted(track.t, (track.t[0] + track.t[-1]) / 2))
+    for part in (slice(0, middle), slice(middle, n)):
+        dt = np.diff(track.t)[part]
+        time = float(dt.sum())
+        east, north = (dt @ track.heading[part] / max(time, 1.0)).tolist()
+        if time > 0 and math.hypot(east, north) > STEADY_HEADING:
+            place = from_plane(track.x[part.start], dive.start.lat, dive.start.lon)
+            yield Leg(place, math.atan2(north, east), state.current, state.speed, time)
 
 
 def is_unseen(dive: Dive) -> bool:
@@ -408,5 +430,5 @@ def _heading(state: Surfacings, speed: float, flow: Array, dive: float) -> tuple
     cov = np.asarray((weights[:, None] * off).T @ off + own * np.eye(2))
     best = int(np.argmax(weights))
     if not state.waypoints:
-        return mean, cov, AGAINST if state.bearing is not None and best == len(WAYS) - 1 else WAYS[0]
+        return mean, cov, UNSENT if state.legs and best == len(WAYS) - 1 else WAYS[0]
     return mean, cov, WAYS[best]

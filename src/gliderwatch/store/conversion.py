@@ -111,6 +111,13 @@ def one_level(state: Any) -> Any:
     return state
 
 
+def with_legs(state: Any) -> Any:
+    """Layout 4 to 5: the last legs show where a glider heads that sends no waypoint; none is known yet."""
+    for memory in (state["settled"], state["memory"]):
+        memory.setdefault("surfacings", {})["legs"] = []
+    return state
+
+
 def _array(written: Mapping[str, Any]) -> Array:
     """An array as a record holds it."""
     return np.frombuffer(base64.b64decode(written["f64"]), dtype="<f8").reshape(written["shape"])
@@ -128,7 +135,7 @@ def same(segment: Any) -> Any:
 
 
 CONVERTERS: Mapping[type, tuple[Converter, ...]] = {
-    GliderState: (typed_dives, one_sea, one_level),
+    GliderState: (typed_dives, one_sea, one_level, with_legs),
     Segment: (same,),
 }
 """For each kind of record the way from layout 1 to today's: the n-th leads from layout n to n + 1. What is in
