@@ -35,7 +35,15 @@ def complaint(text: str, folder: Path) -> str:
 
 def test_there_is_a_scenario_for_each_sea_and_each_fault() -> None:
     faults = {str(kind) for kind in FaultKind if kind is not FaultKind.NONE}
-    assert set(SHIPPED) == faults | {"calm", "tidal", "gulf_stream", "thruster", "deep", "rough_data"}
+    assert set(SHIPPED) == faults | {
+        "calm",
+        "tidal",
+        "gulf_stream",
+        "thruster",
+        "deep",
+        "rough_data",
+        "field",
+    }
 
 
 @pytest.mark.parametrize("name", SHIPPED)

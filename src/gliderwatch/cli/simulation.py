@@ -45,6 +45,20 @@ if TYPE_CHECKING:
 )
 @click.option("--live", is_flag=True, help="Let the files come as time passes; OUT may be in use.")
 @click.option("--speedup", type=click.FloatRange(0, min_open=True), help="With --live: how much faster (1).")
+@click.option("--relays", type=click.IntRange(1, 100), default=1, help="Dockservers that they call (1).")
+@click.option(
+    "--outage",
+    "outages",
+    multiple=True,
+    metavar="RELAY@DAY-DAY",
+    help="When a dockserver is off, as 2@1-1.5; its gliders call the next one.",
+)
+@click.option(
+    "--follow",
+    "advice",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="They follow the advice that a service writes here (fields.NAME.advice.outputs).",
+)
 def simulate(
     out: Path,
     name: str,
@@ -59,10 +73,14 @@ def simulate(
     ailments: tuple[str, ...],
     live: bool,
     speedup: float | None,
+    relays: int,
+    outages: tuple[str, ...],
+    advice: Path | None,
 ) -> None:
     """Simulate gliders and write what a dockserver gets of them.
 
-    OUT will hold gliders/NAME/from-glider and cache; truth.nc and truth.json say what is true of them.
+    OUT will hold gliders/NAME/from-glider and cache; truth.nc and truth.json say what is true of them. With
+    several --relays it is relay-1/gliders/NAME/from-glider and so on.
     """
     from gliderwatch.simulate import job
 
@@ -70,12 +88,16 @@ def simulate(
         raise click.UsageError("--abort goes with --logs")
     if speedup is not None and not live:
         raise click.UsageError("--speedup goes with --live")
-    if not live and out.is_dir() and any(out.iterdir()):
+    if advice is not None and (live or logs or ailments or relays > 1):
+        raise click.UsageError("--follow goes without --live, --logs, --ailment and --relays")
+    if advice is None and not live and out.is_dir() and any(out.iterdir()):
         raise GliderwatchError(f"{out} is not empty: give another folder, or remove it")
     scenarios = job.gliders(name, gliders, days, seed, faults, full_rate)
     rates = job.call_rates(abort) if logs else None
     ill = job.ailments(ailments, scenarios[-1])
-    job.run(job.Job(out, scenarios, compressed, (speedup or 1.0) if live else None, rates, ill))
+    off = job.outages(outages, relays, scenarios[0].start)
+    pace = (speedup or 1.0) if live else None
+    job.run(job.Job(out, scenarios, compressed, pace, rates, ill, relays, off, advice))
 
 
 @click.command(

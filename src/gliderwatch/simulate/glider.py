@@ -4,7 +4,6 @@ scenario."""
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Generator
 from dataclasses import dataclass, field, replace
 
@@ -50,7 +49,10 @@ def simulate(scenario: Scenario) -> Mission:
     Raises:
         ValueError: no steady glide.
     """
-    return deque(voyage(scenario), maxlen=1)[0]
+    underway = Underway(scenario)
+    while underway.time < scenario.start + 86400 * scenario.days:
+        underway.fly()
+    return underway.mission()
 
 
 def voyage(scenario: Scenario) -> Generator[Mission, tuple[Yo, ...] | None, None]:
@@ -61,26 +63,72 @@ def voyage(scenario: Scenario) -> Generator[Mission, tuple[Yo, ...] | None, None
     Raises:
         ValueError: no steady glide.
     """
-    glider = _launch(scenario)
-    files, truth = _Files(glider), list[DiveTruth]()
-    plan, _ = surface(glider, None)
-    name, opened = files.next_name(), plan.opened
-    while glider.time(glider.cycle) < scenario.start + 86400 * scenario.days:
-        flown = dive(glider, name[1])
+    underway = Underway(scenario)
+    while underway.time < scenario.start + 86400 * scenario.days:
+        underway.fly()
+        underway.fly_yos((yield underway.so_far()) or ())
+    yield underway.mission()
+
+
+class Underway:
+    """A mission that goes on: one dive with the surfacing after it at a time."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._glider = _launch(scenario)
+        self._files, self._truth, self._handed_over = _Files(self._glider), list[DiveTruth](), [0, 0, 0]
+        plan, _ = surface(self._glider, None)
+        self._name, self._opened = self._files.next_name(), plan.opened
+
+    @property
+    def glider(self) -> str:
+        """Its name."""
+        return self._glider.scenario.glider
+
+    @property
+    def time(self) -> float:
+        """When its last stay at the surface ended (s)."""
+        return self._glider.time(self._glider.cycle)
+
+    def fly(self) -> None:
+        """Dive, come up, and send. Raises ValueError where there is no steady glide."""
+        files, glider = self._files, self._glider
+        flown = dive(glider, self._name[1])
         plan, seen = surface(glider, flown)
         assert seen is not None
-        truth.append(seen)
-        files.close(name, opened, plan.closed)
+        self._truth.append(seen)
+        files.close(self._name, self._opened, plan.closed)
         files.send(float(glider.rng.uniform(*_SENDING)))
         if plan.restart:
             files.restart(glider.time(plan.opened))
         if plan.own_file:
             files.close(files.next_name(), *plan.own_file)
-        name, opened = files.next_name(), plan.opened
-        glider.yos = (yield files.mission(tuple(truth))) or glider.yos
-    files.close(name, opened, glider.cycle)
-    files.send(float(glider.rng.uniform(*_SENDING)))
-    yield files.mission(tuple(truth))
+        self._name, self._opened = files.next_name(), plan.opened
+
+    def head_for(self, waypoint: Point) -> None:
+        """Go to a waypoint from the next dive on, and on to it once it is reached."""
+        self._glider.scenario = replace(self._glider.scenario, waypoints=(waypoint,))
+        self._glider.waypoint = 0
+
+    def fly_yos(self, yos: tuple[Yo, ...]) -> None:
+        """Fly these yos from the next dive on; none: those of before."""
+        self._glider.yos = yos or self._glider.yos
+
+    def so_far(self) -> Mission:
+        """What it has sent."""
+        return self._files.mission(tuple(self._truth))
+
+    def mission(self) -> Mission:
+        """All of it, as if it ended here: the last segment is at the surface."""
+        self._files.close(self._name, self._opened, self._glider.cycle)
+        self._files.send(float(self._glider.rng.uniform(*_SENDING)))
+        return self.so_far()
+
+    def news(self) -> Mission:
+        """What it sent since this was asked last, as a mission of its own."""
+        kinds = [tuple(kind[n:]) for kind, n in zip(self._files.kinds, self._handed_over, strict=True)]
+        self._handed_over = [len(kind) for kind in self._files.kinds]
+        science = kinds[1] if self._glider.scenario.science else ()
+        return Mission(self._glider.scenario, kinds[0], (), science, kinds[2])
 
 
 def _launch(scenario: Scenario) -> Glider:
@@ -195,22 +243,46 @@ class _Files:
 
 _SPACING = 4000.0
 _ROW = 5
+_WAYPOINTS = 40
 
 
 def fleet(scenario: Scenario, n: int) -> list[Scenario]:
     """The scenarios of ``n`` gliders, 4 km apart in rows of five, each with waypoints of its own.
 
-    They share the sea. The faults go to the gliders in turn: the first to the first glider, and so
-    on; who gets none is healthy. One glider alone is the scenario itself.
+    With a `spread` they are anywhere in its square instead. They share the sea. The faults go to the gliders
+    in turn: the first to the first glider, and so on; who gets none is healthy. One glider alone is the
+    scenario itself, but for such a place.
 
     Raises:
         ValueError: not one glider.
     """
     if n < 1:
         raise ValueError("a fleet has at least one glider")
-    if n == 1:
+    if n == 1 and not scenario.spread:
         return [scenario]
-    return [_member(scenario, i, n) for i in range(n)]
+    member = _member_anywhere if scenario.spread else _member
+    return [_with_interval(member(scenario, i, n)) for i in range(n)]
+
+
+def _with_interval(scenario: Scenario) -> Scenario:
+    """A glider with an interval of its own, where they are drawn."""
+    if scenario.interval_range is None:
+        return scenario
+    return replace(scenario, interval=float(scenario.rng(6).uniform(*scenario.interval_range)))
+
+
+def _member_anywhere(scenario: Scenario, i: int, n: int) -> Scenario:
+    """A glider that begins, and has its waypoints, anywhere in the square of the fleet."""
+    member = replace(scenario, glider=f"{scenario.glider}-{i + 1:02d}", member=i, origin=scenario.place)
+    rng = member.rng(10)
+
+    def anywhere() -> Point:
+        east, north = rng.uniform(0.05, 0.95, (2, 1)) * scenario.spread
+        lat, lon = offset(scenario.place, east, north)
+        return Point(float(lat[0]), float(lon[0]))
+
+    waypoints = tuple(anywhere() for _ in range(_WAYPOINTS))
+    return replace(member, place=anywhere(), waypoints=waypoints, faults=scenario.faults[i::n])
 
 
 def _member(scenario: Scenario, i: int, n: int) -> Scenario:

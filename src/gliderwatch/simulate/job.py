@@ -7,7 +7,7 @@ import json
 import re
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -22,6 +22,7 @@ from gliderwatch.errors import ConfigError, GliderwatchError
 from gliderwatch.simulate.ailments import Ailment, ailing, ailment
 from gliderwatch.simulate.calls import CallLog, CallRates, as_called, call_logs, log_steps
 from gliderwatch.simulate.delivery import (
+    Act,
     FileForm,
     Names,
     Step,
@@ -32,6 +33,8 @@ from gliderwatch.simulate.delivery import (
     write_cache,
     write_full_rate,
 )
+from gliderwatch.simulate.flight import Point
+from gliderwatch.simulate.following import by_files, fly
 from gliderwatch.simulate.glider import fleet, simulate
 from gliderwatch.simulate.scenario import DiveTruth, FaultKind, Mission, Scenario
 from gliderwatch.simulate.scenario_files import fault_line, find, load_scenario
@@ -228,15 +231,31 @@ def _iso(t: float) -> str:
 # ----------------------------------------
 # What `gliderwatch simulate` does: flies a fleet and writes its files, at once or as time passes.
 
+PATIENCE = 30.0
+"""s for which a glider waits at the surface for advice, by the clock of this machine."""
 Logs = Mapping[str, Sequence[CallLog]]
 """The logs of the calls of each glider, in order of time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outage:
+    """That a dockserver (0 is the first) cannot be called from ``start`` to ``end`` (s)."""
+
+    relay: int
+    start: float
+    end: float
+
+    def holds(self, relay: int, t: float) -> bool:
+        """Whether it is off at a time (s)."""
+        return relay == self.relay and self.start <= t < self.end
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
     """Where to write the files of which gliders, whether compressed, and how much faster than time
     (None: at once). ``calls``: how the calls go whose logs are written (None: none are); it is the last
-    glider that aborts, and has the ``ailments``."""
+    glider that aborts, and has the ``ailments``. With several ``relays`` gliders call several dockservers,
+    which have ``outages``; with ``advice`` they follow that which a service writes into this folder."""
 
     out: Path
     scenarios: Sequence[Scenario]
@@ -244,11 +263,24 @@ class Job:
     speedup: float | None = None
     calls: CallRates | None = None
     ailments: tuple[Ailment, ...] = ()
+    relays: int = 1
+    outages: tuple[Outage, ...] = ()
+    advice: Path | None = None
 
     @property
     def dockserver(self) -> Path:
-        """The folder of the gliders' folders."""
+        """The folder of the gliders' folders, of the first dockserver."""
         return self.out / "gliders"
+
+    def root(self, relay: int) -> Path:
+        """The same of each of the dockservers (0 is the first)."""
+        return self.dockserver if self.relays == 1 else self.out / f"relay-{relay + 1}" / "gliders"
+
+    def relay_of(self, member: int, t: float) -> int:
+        """The dockserver that a glider calls at a time (s): its own, or the next that is not off."""
+        order = [(member + k) % self.relays for k in range(self.relays)]
+        up = (relay for relay in order if not any(each.holds(relay, t) for each in self.outages))
+        return next(up, order[0])
 
 
 def gliders(
@@ -283,6 +315,23 @@ def call_rates(abort: str | None) -> CallRates:
     return replace(usual, abort=float(match[2]), cause=match[1].upper())
 
 
+def outages(texts: Sequence[str], relays: int, start: float) -> tuple[Outage, ...]:
+    """Outages as in `2@1-1.5`: the second dockserver is off from day 1 to day 1.5.
+
+    Raises `ConfigError` for one that is none.
+    """
+    found = []
+    for text in texts:
+        match = re.fullmatch(r"(\d{1,3})@(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?)", text)
+        if match is None or not 1 <= int(match[1]) <= relays or float(match[2]) >= float(match[3]):
+            raise ConfigError(
+                f"--outage {text}: give one of {relays} dockservers and two days, as {relays}@1-1.5"
+            )
+        since, until = (start + float(match[k]) * 86400.0 for k in (2, 3))
+        found.append(Outage(int(match[1]) - 1, since, until))
+    return tuple(found)
+
+
 def ailments(texts: Sequence[str], scenario: Scenario) -> tuple[Ailment, ...]:
     """The ailments given in short, of a scenario. Raises `ConfigError` for one that is none."""
     return tuple(ailment(text, scenario.start) for text in texts)
@@ -290,6 +339,9 @@ def ailments(texts: Sequence[str], scenario: Scenario) -> tuple[Ailment, ...]:
 
 def run(job: Job) -> None:
     """Do it, and say what was done. Raises `GliderwatchError` where a glider cannot fly."""
+    if job.advice is not None:
+        _follow(job, job.advice)
+        return
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     console, is_seen = Console(stderr=True), sys.stderr.isatty()
     with Progress(*columns, console=console, transient=True, disable=not is_seen) as progress:
@@ -301,6 +353,24 @@ def run(job: Job) -> None:
         count = _write(job, missions, logs, progress)
     print(f"{count} files of {len(missions)} gliders below {job.dockserver}")
     print(f"what is true of them: {table}, {facts}")
+
+
+def _follow(job: Job, advice: Path) -> None:
+    """Fly on as the service advises, and say what was done."""
+    for scenario in job.scenarios:  # the folders have to be there for the service to watch them
+        (job.dockserver / scenario.glider / "from-glider").mkdir(parents=True, exist_ok=True)
+    form = FileForm(Names.LONG, job.compressed, generation=job.scenarios[0].generation)
+    heard = [0, 0]
+    asked = by_files(job.dockserver, job.out / "cache", advice, form, PATIENCE)
+
+    def answer(sent: Mission) -> Point | None:
+        waypoint = asked(sent)
+        heard[waypoint is None] += 1
+        return waypoint
+
+    fleet = {each.glider: each for each in fly(job.scenarios, answer)}
+    write_truth(job.out, [each.mission() for each in fleet.values()])
+    print(f"{len(fleet)} gliders came up {sum(heard)} times and followed {heard[0]} pieces of advice")
 
 
 def _fly(job: Job, progress: Progress) -> list[Mission]:
@@ -332,9 +402,14 @@ def _write(job: Job, missions: Sequence[Mission], logs: Logs, progress: Progress
     acts: list[Step] = []
     for mission in missions:
         write_cache(job.out / "cache", mission)
-        from_glider(job.dockserver, mission).mkdir(parents=True, exist_ok=True)
+        for relay in range(job.relays):
+            from_glider(job.root(relay), mission).mkdir(parents=True, exist_ok=True)
         called = logs.get(mission.scenario.glider, ())
-        acts += as_called(steps(job.dockserver, mission, _form(job, mission, Names.AS_SENT)), called)
+        acts += _routed(
+            job,
+            mission,
+            as_called(steps(job.dockserver, mission, _form(job, mission, Names.AS_SENT)), called),
+        )
         acts += log_steps(job.dockserver, mission, called)
     acts.sort(key=lambda step: step.time)
     count = sum(step.ends for step in acts)
@@ -345,6 +420,23 @@ def _write(job: Job, missions: Sequence[Mission], logs: Logs, progress: Progress
     for mission in missions:
         count += len(write_full_rate(recovered, mission, _form(job, mission, Names.LONG)))
     return count
+
+
+def _routed(job: Job, mission: Mission, acts: Iterable[Step]) -> Iterator[Step]:
+    """The same acts at the dockservers that are called; all of a file at that where it was begun."""
+    if job.relays == 1:
+        yield from acts
+        return
+    roots = dict[Path, Path]()
+    for step in sorted(acts, key=lambda each: each.time):
+        if step.act in (Act.PUT, Act.BEGIN):
+            roots[step.path] = job.root(job.relay_of(mission.scenario.member, step.time))
+        root, target = roots[step.path], step.target
+        yield replace(
+            step,
+            path=root / step.path.relative_to(job.dockserver),
+            target=None if target is None else root / target.relative_to(job.dockserver),
+        )
 
 
 def _form(job: Job, mission: Mission, names: Names) -> FileForm:

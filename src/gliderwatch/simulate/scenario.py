@@ -228,14 +228,18 @@ class Scenario:
     water makes more or less by the part ``drive_sigma``, wandering within a day; ``allowed`` is the part of
     the loss by the angle of attack that the glider allows for when it reckons; ``depths`` (m) are the upper
     and lower turns, the lower one varying by ``bottom_sigma``. Where there is a ``bottom`` the glider
-    turns ``altitude`` (m) above it. The glider comes up after ``interval`` (s) and talks for a time
-    between ``communications`` (s), adrift with ``wind_drift`` (m/s) over the current.
+    turns ``altitude`` (m) above it. The glider comes up after ``interval`` (s), by
+    ``interval_jitter`` (s) more or less on each dive; with an ``interval_range`` (s) each glider of
+    a fleet has an interval of its own. It talks for a time between ``communications`` (s), adrift
+    with ``wind_drift`` (m/s) over the current.
     ``heading_sigma`` (rad) is the error of the heading controller, ``gps_sigma`` (m) of
     a fix, a component. ``fix_in`` and ``surface_segments`` say how files are split: with the latter
     each stay at the surface has a short file of its own. ``cadence`` (s) says which sensors are sent,
     and how often at most, ``science`` the same of the science computer (empty: no tbd), and
     ``nth_yo`` which of all these are sent on every n-th yo only. ``full_rate`` asks for dbd and ebd.
-    ``member`` is the number of the glider in its fleet, whose sea has its origin at ``origin``.
+    ``member`` is the number of the glider in its fleet, whose sea has its origin at ``origin``; with a
+    ``spread`` (m) the gliders begin, and have their waypoints, anywhere in a square of this side whose
+    south-western corner is ``place``.
     """
 
     seed: int = 1
@@ -257,6 +261,9 @@ class Scenario:
     depths: tuple[float, float] = (4.0, 60.0)
     bottom_sigma: float = 1.0
     interval: float = 3 * 3600.0
+    interval_jitter: float = 0.0
+    interval_range: tuple[float, float] | None = None
+    spread: float = 0.0
     communications: tuple[float, float] = (300.0, 2400.0)
     wind_drift: Vector = Vector(0.04, -0.03)
     heading_sigma: float = 0.1
@@ -292,9 +299,22 @@ class Scenario:
         return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(*key, *member)))
 
 
+def _problems_of_fleet(scenario: Scenario) -> list[str]:
+    """The same of what differs between the gliders of a fleet."""
+    found = []
+    if not 0 <= scenario.interval_jitter <= scenario.interval / 2:
+        found.append("interval_jitter is 0 s to half of the interval")
+    low, high = scenario.interval_range or (600.0, 86400.0)
+    if not 600 <= low <= high <= 86400:
+        found.append("interval_range is the shortest and the longest, 600 to 86400 s")
+    if not 0 <= scenario.spread <= 500e3:
+        found.append("spread is 0 to 500000 m")
+    return found
+
+
 def _problems(scenario: Scenario) -> list[str]:
     """What in a scenario cannot be, in words."""
-    found = []
+    found = _problems_of_fleet(scenario)
     if not (0 < scenario.days <= 366 and 600 <= scenario.interval <= 86400):
         found.append("days are above 0 and at most 366, the interval is 600 to 86400 s")
     if not scenario.waypoints:

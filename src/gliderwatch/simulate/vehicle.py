@@ -72,9 +72,11 @@ class Glider:
     yos: tuple[Yo, ...] = ()
     health: Health = field(init=False)
     trimming: np.random.Generator = field(init=False)
+    timing: np.random.Generator = field(init=False)
 
     def __post_init__(self) -> None:
         self.health, self.trimming = self.scenario.health, self.scenario.rng(4)
+        self.timing = self.scenario.rng(5)
         self.trim = float(self.trimming.standard_normal())
 
     def wander_trim(self) -> None:
@@ -90,6 +92,11 @@ class Glider:
             else:
                 yield from repeat((yo.top, yo.bottom))
         yield from repeat(self.scenario.depths)
+
+    def next_interval(self) -> float:
+        """How long (s) the next dive is to be."""
+        jitter = self.scenario.interval_jitter
+        return self.scenario.interval + (float(self.timing.uniform(-jitter, jitter)) if jitter else 0.0)
 
     def time(self, cycle: int) -> float:
         """Time (s) of a cycle."""
@@ -235,7 +242,7 @@ def _held(glider: Glider, t: Array, motion: Motion) -> Motion:
 def _legs(glider: Glider, way: _Way) -> Iterator[_Piece]:
     """The legs of a dive, one after another, until it is time to surface."""
     scenario, rng, health = glider.scenario, glider.rng, glider.health
-    elapsed, depth, start = 0.0, 0.0, glider.time(glider.cycle)
+    elapsed, depth, start, interval = 0.0, 0.0, glider.time(glider.cycle), glider.next_interval()
     down, turns = True, glider.turns()
     surfacing = False
     while not surfacing:
@@ -246,9 +253,9 @@ def _legs(glider: Glider, way: _Way) -> Iterator[_Piece]:
             limit = float(way.water_depth(np.array(elapsed))) - scenario.altitude
             target = min(bottom + scenario.bottom_sigma * rng.standard_normal(), limit)
             # In a net it would be on its way for ever: it turns when it has to think of surfacing.
-            target = max(min(target, depth + speed * scenario.interval), top + _LEAST_RANGE)
+            target = max(min(target, depth + speed * interval), top + _LEAST_RANGE)
         else:
-            surfacing = elapsed + depth / speed >= scenario.interval
+            surfacing = elapsed + depth / speed >= interval
             target = 0.0 if surfacing else top
         left, first = abs(target - depth), True
         while left > 1e-6:

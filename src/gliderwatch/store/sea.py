@@ -81,7 +81,7 @@ class Fields:
         then."""
         held = self._newest.get(field, ())
         start = held[-1] if held else self._start(field, inf)
-        after = run(start, self._batches(field, start), params, most)
+        after = run(start, self.batches(field, start), params, most)
         whole = after if start is None else (start, *after)
         self._newest[field] = (*held[:-1], *whole)[-2 * BLOCK :]
         written = [a for a, b in itertools.pairwise(whole) if a.bin // BLOCK < b.bin // BLOCK]
@@ -99,7 +99,7 @@ class Fields:
         last = t // BIN if t < inf else inf
         held = [each for each in self._newest.get(field, ()) if each.bin < last]
         start = held[-1] if held else self._start(field, last)
-        after = run(start, self._batches(field, start), params)
+        after = run(start, self.batches(field, start), params)
         found = [each for each in after if each.bin < last]
         return found[-1] if found else start
 
@@ -133,7 +133,8 @@ class Fields:
         row = self._db.execute(sql, (field, last)).fetchone()
         return None if row is None else Checkpoint(row[0], _information(row[1]))
 
-    def _batches(self, field: str, start: Checkpoint | None) -> Iterable[Batch]:
+    def batches(self, field: str, start: Checkpoint | None = None) -> list[Batch]:
+        """The batches of a field with samples after a checkpoint (None: all), in no order."""
         sql = "SELECT id, glider, data FROM field_batches WHERE field = ? AND last_t >= ?"
         since = -inf if start is None else (start.bin + 1) * BIN
         return [_batch(row) for row in self._db.execute(sql, (field, since))]
