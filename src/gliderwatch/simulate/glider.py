@@ -4,6 +4,7 @@ scenario."""
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Generator
 from dataclasses import dataclass, field, replace
 
@@ -49,10 +50,7 @@ def simulate(scenario: Scenario) -> Mission:
     Raises:
         ValueError: no steady glide.
     """
-    underway = Underway(scenario)
-    while underway.time < scenario.start + 86400 * scenario.days:
-        underway.fly()
-    return underway.mission()
+    return deque(voyage(scenario), maxlen=1)[0]
 
 
 def voyage(scenario: Scenario) -> Generator[Mission, tuple[Yo, ...] | None, None]:
