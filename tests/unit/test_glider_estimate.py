@@ -70,6 +70,16 @@ def test_a_model_that_fits_is_told_of_and_flags_nothing(estimator):
     assert "reference flow: model.nc" in found[5].notes[-1]
 
 
+def test_with_the_fleet_a_model_is_evidence_and_not_the_reference():
+    own, both = told(STRAIGHT, None), told(STRAIGHT, field(0.1, -0.2), reference="fleet")
+    last = both[-1]
+    assert (last.evidence["model_u"], last.evidence["model_v"]) == pytest.approx((0.1, -0.2), abs=0.02)
+    assert last.evidence["model_sigma"] > 0
+    assert [each.flag for each in both] == [each.flag for each in own]
+    assert (last.reference_u, last.reference_v) == (own[-1].reference_u, own[-1].reference_v)
+    assert "model_u" not in told(STRAIGHT, None, reference="fleet")[-1].evidence
+
+
 def test_a_model_that_does_not_fit_is_flag_2():
     found = told(STRAIGHT, field(-0.6, 0.5), reference="model")
     assert {a.flag for a in found} == {2}
