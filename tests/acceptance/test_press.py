@@ -125,7 +125,7 @@ def test_a_button_pressed_on_a_phone_stops_the_escalation(tmp_path: Path) -> Non
                 assert not browser.find_elements("tag name", "button")
             assert len(site.status()["held"]) == 1
             browser.get(found[0])
-            assert "Take on bruce/anomaly/" in text_of(browser)
+            assert "Take on bruce: anomaly since 20" in text_of(browser)
             assert len(site.status()["held"]) == 1  # opening it does nothing
             browser.find_element("name", "by").send_keys("Ann")
             assert "taken on by Ann (duty)" in pressed(browser, "I take it on")

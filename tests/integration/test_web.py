@@ -206,7 +206,7 @@ def test_the_pages_lead_to_what_they_show(client: TestClient, config: Config) ->
     page = client.get("/electa.html").text
     paths = re.findall(r'href="(ack/[^"]+)"', page)
     assert len(paths) == 2  # the incident, the glider
-    assert "Take on electa/anomaly/1?" in client.get(f"/{paths[0]}").text
+    assert "Take on electa: anomaly since 1970-01-01 00:00 UTC?" in client.get(f"/{paths[0]}").text
     assert "taken on by Ann (who reads the pages)" in client.post(f"/{paths[0]}", data={"by": "Ann"}).text
     assert "muted until" in client.post(f"/{paths[1]}", data={"what": "mute", "hours": "3"}).text
 

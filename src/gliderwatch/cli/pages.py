@@ -82,9 +82,10 @@ def web(config_path: Path, link: str | None, recipient: str | None) -> None:
 
     def acknowledge(incident: str, by: str, now: float) -> str:
         from gliderwatch.cli.status import acknowledge_incident
+        from gliderwatch.pages.matters import in_words
 
         entry, is_new = acknowledge_incident(config, incident, by, "", now)
-        return f"{entry.incident.id}: {'taken on' if is_new else 'was taken on already'} by {by}."
+        return f"{in_words(entry.incident.id)}: {'taken on' if is_new else 'was taken on already'} by {by}."
 
     def mute(glider: str, end: float, now: float) -> str:
         from gliderwatch.cli.manage import mute_glider

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from gliderwatch.incidents.acknowledgement import Ack, Acks
 from gliderwatch.incidents.health import HealthThread
 from gliderwatch.incidents.notifications import NotificationState
-from gliderwatch.messages.formatting import INCIDENTS, clean
+from gliderwatch.messages.formatting import INCIDENTS, clean, utc
 from gliderwatch.model import Incident, Kind, Severity
 
 
@@ -43,6 +44,20 @@ def matters(incidents: tuple[Incident, ...], state: NotificationState, acks: Ack
         *_others(state, acks),
     ]
     return tuple(sorted(found, key=lambda m: (m.since, m.id)))
+
+
+def in_words(identity: str) -> str:
+    """What the id of an incident stands for; the id itself where it is of another form.
+
+    >>> in_words("electa/anomaly/1667639520"), in_words("electa/health/slow_leak/1667639520")
+    ('electa: anomaly since 2022-11-05 09:12 UTC', 'electa: slow leak since 2022-11-05 09:12 UTC')
+    """
+    glider, *kinds = identity.split("/")
+    if len(kinds) < 2 or re.fullmatch(r"\d{1,10}", kinds[-1], re.ASCII) is None:
+        return clean(identity)
+    number = kinds.pop()
+    word = INCIDENTS.get(Kind(kinds[0]), kinds[-1]) if kinds[0] in set(Kind) else kinds[-1]
+    return clean(f"{glider}: {word.replace('_', ' ')} since {utc(float(number))}")
 
 
 def _of_dives(incident: Incident, acks: Acks) -> Matter:

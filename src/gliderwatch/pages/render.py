@@ -27,6 +27,7 @@ from gliderwatch.model import Assessment, Flag, Severity
 from gliderwatch.pages import facts, fields, maps
 from gliderwatch.pages.call_log import call_log, transferred
 from gliderwatch.pages.fields import FieldView
+from gliderwatch.pages.matters import in_words
 from gliderwatch.pages.view import GliderView, Verdict, verdict, worst_first
 
 HOUR, DAY = 3600.0, 86400.0
@@ -201,7 +202,7 @@ def ack_page(frame: Frame, incident: str, recipient: str, answer: str, *, is_ope
     """The page of a link that acknowledges or mutes: buttons, or the `answer` to one; only the latter where
     the incident is none that can be taken on (`is_open`)."""
     glider = incident.partition("/")[0]
-    values = {"incident": incident, "glider": glider, "recipient": recipient, "answer": answer}
+    values = {"what": in_words(incident), "glider": glider, "recipient": recipient, "answer": answer}
     return _render("ack.html", frame, **values, is_open=is_open)
 
 

@@ -341,7 +341,7 @@ async def _form(request: Request) -> dict[str, str]:
 def _who(typed: str, recipient: str) -> str:
     """Who takes it on: the name that was typed, beside the recipient of the link."""
     name = clean(typed, 40)
-    return f"{name} ({recipient})" if name else recipient
+    return f"{name} ({recipient})" if name and name != recipient else recipient
 
 
 def _ack_page(
