@@ -271,6 +271,16 @@ def test_news_come_when_the_state_has_changed(client: TestClient, config: Config
     assert "Bob has it" in client.get("/").text
 
 
+def test_who_asks_the_api_in_turn_gets_one_answer_until_there_is_news(
+    client: TestClient, config: Config
+) -> None:
+    first, second = (client.get("/api/gliders").json() for _ in range(2))
+    assert first == second
+    acknowledge_incident(config, "electa/anomaly/1", "Bob", "", time.time())
+    assert [i["acknowledged_by"] for i in client.get("/api/incidents").json()] == ["Bob"]
+    assert client.get("/api/gliders").json()[0]["as_of"] > first[0]["as_of"]
+
+
 def test_a_page_that_the_browser_has_is_not_sent_again(client: TestClient) -> None:
     plain = client.get("/electa.html", headers={"Accept-Encoding": "identity"})
     packed = client.get("/electa.html", headers={"Accept-Encoding": "gzip"})

@@ -54,6 +54,8 @@ MUTES = ("3", "6", "12", "24")
 """Hours for which a glider can be muted."""
 LOOK = 1.0
 """Seconds between two looks at whether the state file has changed."""
+FRESH = 10.0
+"""Seconds for which all who ask the API get one answer, while the state file does not change."""
 SIGN = 15.0
 """Seconds between two signs of life of a stream of news: proxies close silent ones."""
 LIMIT = 60.0
@@ -130,6 +132,7 @@ class Site:
         self.news = asyncio.Condition()
         self.pages = PageCache(self._make, self._mark, kept)
         self._shown: Shown | None = None
+        self._fleet: tuple[Hashable, float, tuple[GliderView, ...]] | None = None
         self._marks: dict[str, Hashable] = {}
         self._seen: Hashable = None
 
@@ -169,7 +172,14 @@ class Site:
                     self.news.notify_all()
 
     def fleet(self, now: float, dives: int = 1) -> tuple[GliderView, ...]:
-        """All gliders as known at `now` (s), with so many dives of each."""
+        """All gliders as known at `now` (s), or a moment before if nothing has changed, with so many dives of
+        each."""
+        mark, read = (stamp_of(self.state), dives), self._fleet
+        if read is None or read[0] != mark or now - read[1] >= FRESH:
+            read = self._fleet = (mark, now, self._read_fleet(now, dives))
+        return read[2]
+
+    def _read_fleet(self, now: float, dives: int) -> tuple[GliderView, ...]:
         with Store.looking(self.state) as store:
             names = names_of(store, self.config.gliders)
             batteries = {name: battery_limits(self.config, name) for name in names}
