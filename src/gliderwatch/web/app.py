@@ -90,7 +90,8 @@ def stamp_of(state: Path) -> Hashable:
     for path in (state, state.with_name(f"{state.name}-wal")):
         with suppress(OSError):
             status = path.stat()
-            found.append((path.suffix, status.st_mtime_ns, status.st_size))
+            if status.st_size:  # a log is made by who only reads, too
+                found.append((path.name, status.st_mtime_ns, status.st_size))
     return tuple(found)
 
 
