@@ -12,7 +12,7 @@ import pytest
 from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine
 from gliderwatch.model import Alert, Kind, Segment, Severity
 from gliderwatch.params import Attention, GliderParams
-from gliderwatch.service import judgement, transaction
+from gliderwatch.service import judgement, run, transaction
 from gliderwatch.service.backlog import Job
 from gliderwatch.service.replay import Request, replay
 from gliderwatch.service.routing import Routing
@@ -170,7 +170,7 @@ def test_files_that_an_error_of_the_program_quarantines(copied, monkeypatch: pyt
     def broken(*_: object) -> None:
         raise ZeroDivisionError("float division by zero")
 
-    monkeypatch.setattr(transaction, "process", broken)
+    monkeypatch.setattr(run, "process", broken)
     fed(live, files[onset(files) :])
     first = is_told_once_and_in_time(live, files)
     assert "ZeroDivisionError" in first.body and "please report it" in first.body

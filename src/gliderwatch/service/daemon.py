@@ -25,6 +25,7 @@ from gliderwatch.service.liveness import BEAT, PidLock
 from gliderwatch.service.page_writer import PagesWritten, PageWriter
 from gliderwatch.service.relays import BatchesCame
 from gliderwatch.service.routing import Routing
+from gliderwatch.service.run import StoppedError
 from gliderwatch.service.runtime import Decoded, News, Runtime, build
 from gliderwatch.service.state_outage import StateOutage
 from gliderwatch.service.virtual_ais import VirtualAis
@@ -191,7 +192,7 @@ class Daemon:
                 while not self._stopping:
                     if not self._outage.spared(self._turn):
                         self._caught_up, self._retry = False, True  # what it had begun may be half done
-        except transaction.StoppedError:
+        except StoppedError:
             pass
         except DamagedError:  # it is logged: the next start makes a new state
             raise

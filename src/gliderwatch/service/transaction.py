@@ -1,14 +1,14 @@
-"""Processing one input: all that it leads to is written in one transaction, or nothing is."""
+"""One input: all that it leads to is written in one transaction, or nothing is; what is long in it is done
+before."""
 
 from __future__ import annotations
 
 import socket
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import zip_longest
 from math import inf
+from typing import TypeVar
 
-from gliderwatch.errors import GliderwatchError, NotAssessed
 from gliderwatch.fleet.constants import CHECK_WINDOW
 from gliderwatch.fleet.cross_check import current_of
 from gliderwatch.fleet.flow import DiveCurrent
@@ -25,7 +25,7 @@ from gliderwatch.messages.template import with_machine
 from gliderwatch.model import Alert, Assessment, Kind, Segment, SegmentId
 from gliderwatch.navigation.clock import moved
 from gliderwatch.params import GliderParams
-from gliderwatch.pipeline import GliderState, Outcome, process
+from gliderwatch.pipeline import GliderState
 from gliderwatch.sea.ocean_field import Field
 from gliderwatch.service import fields as fields_of_sea
 from gliderwatch.service import layers as layers_of_sea
@@ -33,8 +33,12 @@ from gliderwatch.service.call_additions import expect_by_calls, keep_call, touch
 from gliderwatch.service.fields import FieldAdvice, FleetField, look
 from gliderwatch.service.layers import GliderLayers
 from gliderwatch.service.routing import Routing, post_alerts, post_due, withdraw_answered
+from gliderwatch.service.run import Processed, Run, processed
 from gliderwatch.slocum.calls import Dialog
+from gliderwatch.store.segments import Plan
 from gliderwatch.store.state_file import File, Status, Store
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +55,6 @@ class FileOutcome:
 
 LAST_ADVICE = 86400.0
 """s: how deep to fly is not advised by what was measured longer before the last dive."""
-
-
-class StoppedError(GliderwatchError):
-    """The daemon ends while an input is processed: nothing of it is kept, the next start processes it."""
 
 
 def process_file(
@@ -78,22 +78,28 @@ def process_file(
     Raises Quarantine for a segment that cannot be assessed, StoppedError once `stopping` holds; then
     nothing has changed.
     """
-    glider = segment.id.glider
-    with store.transaction():
+    glider, before = segment.id.glider, file
+
+    def commit(done: Processed | None) -> FileOutcome:
         if not store.segments.is_fuller(segment):
-            file = replace(file, status=Status.DUPLICATE, reason="this segment is known from a fuller copy")
+            reason = "this segment is known from a fuller copy"
+            file = replace(before, status=Status.DUPLICATE, reason=reason)
             store.receive(file, segment.id, segment.last_t, now)
             return FileOutcome(file, alerts=_due_messages(store, glider, params, routing, now))
-        file = replace(file, status=Status.TAKEN, reason="")
+        file = replace(before, status=Status.TAKEN, reason="")
         store.receive(file, segment.id, segment.last_t, now)
-        first = _place(store, segment)
-        assessments, state = _run(store, first, segment, params, stopping, ocean, layers)
+        assessments, state = _keep(store, _place(store, segment), segment, done, layers)
         if fields:
             fields_of_sea.add(store, fields, store.segments.kept(segment.id))
         advice = look(store, fields, glider, state) if fields and routing is not None else ()
         alerts = _due_messages(store, glider, params, routing, now)
         deep = layers_of_sea.newest(store, glider) if layers is not None and routing is not None else None
-    return FileOutcome(file, assessments, alerts, advice, deep)
+        return FileOutcome(file, assessments, alerts, advice, deep)
+
+    with store.guarded():
+        run = _foreseen(store, segment)
+        done = None if run is None else processed(run, params, ocean, stopping)
+    return _committed(store, commit, done, params, ocean, stopping)
 
 
 def record_file(
@@ -132,8 +138,9 @@ def process_log(
     `notify_pilots` does. `ocean` and `layers` are as for `process_file`.
     Raises Quarantine where they cannot be assessed; then nothing has changed.
     """
-    assessments, alerts = tuple[Assessment, ...](), tuple[Alert, ...]()
-    with store.transaction():
+
+    def commit(done: Processed | None) -> FileOutcome:
+        assessments, alerts = tuple[Assessment, ...](), tuple[Alert, ...]()
         store.record(file, now)
         if dialog is not None:
             keep_call(store, file, dialog, now)
@@ -142,9 +149,11 @@ def process_log(
                 store.health.put(call.glider, file.path, call.last_t, of_call(call))
         if file.status is Status.TAKEN:
             if catch_up:
-                assessments = _catch_up(store, file.glider, params, ocean, layers)
+                assessments = _catch_up(store, file.glider, done, layers)
             alerts = _due_messages(store, file.glider, params, routing, now)
-    return FileOutcome(file, assessments, alerts)
+        return FileOutcome(file, assessments, alerts)
+
+    return _committed(store, commit, None, params, ocean)
 
 
 def notify_pilots(
@@ -158,9 +167,12 @@ def notify_pilots(
 ) -> tuple[Alert, ...]:
     """Make the messages that are due of a glider without any new input: after a start, a new configuration or
     many logs. Raises Quarantine as `process_log` does."""
-    with store.transaction():
-        _catch_up(store, glider, params, ocean, layers)
+
+    def commit(done: Processed | None) -> tuple[Alert, ...]:
+        _catch_up(store, glider, done, layers)
         return _due_messages(store, glider, params, routing, now)
+
+    return _committed(store, commit, None, params, ocean)
 
 
 def tick(store: Store, glider: str, routing: Routing, others: Iterable[str], now: float) -> tuple[Alert, ...]:
@@ -241,50 +253,81 @@ def _place(store: Store, segment: Segment) -> SegmentId:
     return touched(store, first)
 
 
-def _run(
+class _ToProcessError(Exception):
+    """A transaction cannot be committed before a run is processed, which must not be done inside of it."""
+
+    def __init__(self, run: Run) -> None:
+        super().__init__("to be processed first")
+        self.run = run
+
+
+def _committed(
     store: Store,
-    first: SegmentId,
-    fresh: Segment | None,
+    commit: Callable[[Processed | None], T],
+    done: Processed | None,
     params: GliderParams,
-    stopping: Callable[[], bool],
     ocean: Field | None,
-    layers: GliderLayers | None,
+    stopping: Callable[[], bool] = lambda: False,
+) -> T:
+    """Do a transaction that needs a run to be processed. Others can write while that goes on: the dispatcher
+    that a mail was accepted, somebody an acknowledgement.
+
+    `done` is what was foreseen. Where it is not what is needed, nothing is committed and that is processed.
+    """
+    while True:
+        try:
+            with store.transaction():
+                return commit(done)
+        except _ToProcessError as missing:
+            done = processed(missing.run, params, ocean, stopping)
+
+
+def _foreseen(store: Store, segment: Segment) -> Run | None:
+    """The run that a segment makes necessary which comes after all that are held of its glider; None of
+    another."""
+    plan = store.segments.plan_after(segment.id)
+    if plan is None:
+        return None
+    *held, last = plan.segments
+    fresh = moved(segment, last.opened_at - segment.id.opened_at)
+    return _run(store, plan, [*map(store.segments.get, held), fresh])
+
+
+def _keep(
+    store: Store, first: SegmentId, fresh: Segment | None, done: Processed | None, layers: GliderLayers | None
 ) -> tuple[tuple[Assessment, ...], GliderState]:
-    """Process a segment that is held and all after it; `fresh` is one of them that is at hand, whole."""
-    state, todo = store.segments.resume(first)
+    """Keep the outcomes of a segment that is held and all after it; `fresh` is one of them that is at hand,
+    whole. Raises _ToProcessError where `done` is not of the same run."""
+    plan = store.segments.plan(first)
+    if done is None or done.run.plan != plan:
+        whole = {} if fresh is None else {fresh.id: fresh}
+        segments = [whole[one] if one in whole else store.segments.get(one) for one in plan.segments]
+        raise _ToProcessError(_run(store, plan, segments))
     dives: dict[float, Assessment] = {}
-    for identity, following in zip_longest(todo, todo[1:]):
-        if stopping():
-            raise StoppedError(f"{identity.name} was not processed: the daemon ends")
-        one = fresh if fresh is not None and identity == fresh.id else store.segments.get(identity)
-        one = with_additions(store, one, inf if following is None else following.opened_at)
-        outcome = _process(state, one, params, ocean)
+    for identity, outcome in zip(plan.segments, done.outcomes, strict=True):
         store.keep(identity, outcome)
         if layers is not None:
             layers_of_sea.learn(store, identity, layers)
-        state = outcome.state
         dives = {t: a for t, a in dives.items() if t < outcome.since} | {
             a.t_dive: a for a in outcome.assessments
         }
     store.segments.thin(first.glider)
-    return tuple(dives.values()), state
+    return tuple(dives.values()), done.outcomes[-1].state
+
+
+def _run(store: Store, plan: Plan, segments: Sequence[Segment]) -> Run:
+    """A plan with the state that it begins with, and its segments with what calls add to them."""
+    ends = [*(one.opened_at for one in plan.segments[1:]), inf]
+    whole = tuple(with_additions(store, one, end) for one, end in zip(segments, ends, strict=True))
+    return Run(plan, store.segments.state(plan.base), whole)
 
 
 def _catch_up(
-    store: Store, glider: str, params: GliderParams, ocean: Field | None, layers: GliderLayers | None
+    store: Store, glider: str, done: Processed | None, layers: GliderLayers | None
 ) -> tuple[Assessment, ...]:
-    """Process what calls have made outdated."""
+    """Keep what calls have made outdated, processed again. Raises _ToProcessError as `_keep`."""
     newest = store.segments.behind(glider)
-    return () if newest is None else _run(store, newest, None, params, lambda: False, ocean, layers)[0]
-
-
-def _process(state: GliderState, segment: Segment, params: GliderParams, ocean: Field | None) -> Outcome:
-    """`process`, in which one segment of unforeseen content must not stop all gliders for good."""
-    try:
-        return process(state, segment, params, ocean)
-    except Exception as error:
-        what = f"{type(error).__name__}: {error}"
-        raise NotAssessed(f"cannot be assessed, please report it ({segment.id.name}: {what})") from error
+    return () if newest is None else _keep(store, newest, None, done, layers)[0]
 
 
 def _due_messages(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlite3
 import zlib
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from gliderwatch.model import NextSurfacing, Segment, SegmentId
 from gliderwatch.navigation.clock import (
@@ -44,15 +44,26 @@ class MissionClocks:
     def __init__(self, connection: sqlite3.Connection) -> None:
         self._db = connection
         self._clocks: dict[tuple[str, str], MissionClock] = {}
+        self._unsure: set[str] = set()
 
     def clear(self) -> None:
         """Know nothing: what is in the state file is another than it was."""
         self._clocks.clear()
 
+    def commit(self) -> None:
+        """What was corrected since the last time is in the state file."""
+        self._unsure.clear()
+
+    def rollback(self) -> None:
+        """It is not: know nothing of those gliders."""
+        self._clocks = {key: clock for key, clock in self._clocks.items() if key[0] not in self._unsure}
+        self._unsure.clear()
+
     def correct(self, identity: SegmentId, last_t: float) -> dict[SegmentId, SegmentId]:
         """Put the segments of a mission where they belong in time, after one was put there by its own clock,
         which has its last sample at ``last_t`` (s); the ids before and after of those moved."""
         glider, name = identity.glider, identity.name
+        self._unsure.add(glider)
         mission, number = numbered(name)
         stamp = Stamp(number, identity.opened_at, last_t)
         clock = self._clocks.get((glider, mission))
@@ -208,6 +219,17 @@ SPARSE = 16
 """Of the older ones one in this many does. Its name decides, so that no order of arrival matters."""
 
 
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Segments that are to be processed upon the state after ``base`` (None: upon that of a glider of which
+    nothing is known), in order of time. ``revision`` counts the transactions that changed what is held of
+    the glider: two plans of equal revision and segments lead to equal outcomes."""
+
+    base: SegmentId | None
+    segments: tuple[SegmentId, ...]
+    revision: int
+
+
 class Segments:
     """The segments in a state file, on the connection of its store.
 
@@ -219,6 +241,22 @@ class Segments:
         self._db = connection
         self.ahead, self.following = CheckpointCache(), 0
         self.clocks = MissionClocks(connection)
+        self._revisions: dict[str, int] = {}
+        self._changed: set[str] = set()
+
+    def commit(self) -> None:
+        """What was written since the last time is in the state file."""
+        self.ahead.commit()
+        self.clocks.commit()
+        for glider in self._changed:
+            self._revisions[glider] = self._revisions.get(glider, 0) + 1
+        self._changed.clear()
+
+    def rollback(self) -> None:
+        """It is not."""
+        self.ahead.rollback()
+        self.clocks.rollback()
+        self._changed.clear()
 
     def completeness(self, identity: SegmentId) -> tuple[int, int, str] | None:
         """Of the copy of a segment that is held, None when there is none; by the glider's clock."""
@@ -263,6 +301,7 @@ class Segments:
         """
         thinned = replace(segment, quantities=downsample(segment.quantities))
         glider, name = segment.id.glider, segment.id.name
+        self._changed.add(glider)
         old, touched, correction = self._held(segment.id), list[SegmentId](), Correction()
         if old is not None:
             touched = [SegmentId(old["opened_at"], glider, name)]
@@ -293,20 +332,51 @@ class Segments:
         for table in ("expected", "layers"):
             self._db.execute(f"DELETE FROM {table} WHERE glider = ? AND opened_at = ? AND segment = ?", key)
 
-    def resume(self, first: SegmentId) -> tuple[GliderState, list[SegmentId]]:
-        """The newest state before a segment, and the ids of all segments after it, in order of time."""
+    def plan(self, first: SegmentId) -> Plan:
+        """What is to be processed where a segment or more from `first` on are new: all after the newest state
+        before it."""
+        glider, base = first.glider, self._base(first)
+        after = self.of(glider) if base is None else self._after(glider, base.opened_at, base.name)
+        return Plan(base, tuple(after), self._revisions.get(glider, 0))
+
+    def plan_after(self, identity: SegmentId) -> Plan | None:
+        """The same for one that is still to be put, by the glider's clock, as far as can be foreseen; None
+        where it does not come after all that are held."""
+        here = replace(identity, opened_at=identity.opened_at + self.clocks.offset(identity))
+        newest = self.last_before(identity.glider, float("inf"))
+        if newest is not None and (newest >= here or self._held(identity) is not None):
+            return None
+        plan = self.plan(here)
+        return replace(plan, segments=(*plan.segments, here))
+
+    def _base(self, first: SegmentId) -> SegmentId | None:
+        """The newest segment before another that has its state."""
         ahead = self.ahead.before(first)
         if ahead is not None:
-            return ahead[1], self._after(first.glider, ahead[0].opened_at, ahead[0].name)
+            return ahead[0]
         self.ahead.drop(first.glider)
         row = self._db.execute(
-            "SELECT opened_at, name, checkpoint FROM segments WHERE glider = ? AND checkpoint IS NOT NULL "
+            "SELECT opened_at, name FROM segments WHERE glider = ? AND checkpoint IS NOT NULL "
             "AND (opened_at, name) < (?, ?) ORDER BY opened_at DESC, name DESC LIMIT 1",
             (first.glider, first.opened_at, first.name),
         ).fetchone()
-        if row is None:
-            return GliderState(), self.of(first.glider)
-        return codec.decode(row[2], GliderState), self._after(first.glider, row[0], row[1])
+        return None if row is None else SegmentId(row[0], first.glider, row[1])
+
+    def state(self, identity: SegmentId | None) -> GliderState:
+        """The state after a segment that has it; None: of a glider of which nothing is known."""
+        if identity is None:
+            return GliderState()
+        if (ahead := self.ahead.of(identity)) is not None:
+            return ahead
+        data = self._checkpoint(identity)
+        if data is None:
+            raise KeyError(identity.name)
+        return codec.decode(data, GliderState)
+
+    def resume(self, first: SegmentId) -> tuple[GliderState, list[SegmentId]]:
+        """The newest state before a segment, and the ids of all segments after it, in order of time."""
+        plan = self.plan(first)
+        return self.state(plan.base), list(plan.segments)
 
     def of(self, glider: str) -> list[SegmentId]:
         """The ids of all segments of a glider, in order of time."""
@@ -340,6 +410,7 @@ class Segments:
             (first.glider, first.opened_at, first.name),
         )
         self.ahead.drop(first.glider)
+        self._changed.add(first.glider)
 
     def behind(self, glider: str) -> SegmentId | None:
         """The newest segment of a glider, if the state after it is outdated."""
@@ -395,6 +466,7 @@ class Segments:
 
     def checkpoint(self, identity: SegmentId, state: GliderState) -> None:
         """Keep the state after a segment, and the surfacing that it leads to expect."""
+        self._changed.add(identity.glider)
         key = (identity.glider, identity.opened_at, identity.name)
         if self.following:
             self.ahead.keep(identity, state)

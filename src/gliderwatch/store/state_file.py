@@ -88,10 +88,9 @@ class Store:
             try:
                 yield
                 self._db.execute("COMMIT")
-                self.segments.ahead.commit()
+                self.segments.commit()
             except BaseException:
-                self.segments.ahead.rollback()
-                self.segments.clocks.clear()
+                self.segments.rollback()
                 self.fields.rollback()
                 if self._db.in_transaction:  # on a full disk SQLite may have ended it by itself
                     self._db.execute("ROLLBACK")
