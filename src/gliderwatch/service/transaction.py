@@ -299,7 +299,7 @@ def _keep(
     """Keep the outcomes of a segment that is held and all after it; `fresh` is one of them that is at hand,
     whole. Raises _ToProcessError where `done` is not of the same run."""
     plan = store.segments.plan(first)
-    if done is None or done.run.plan != plan:
+    if done is None or not done.run.plan.is_as(plan):
         whole = {} if fresh is None else {fresh.id: fresh}
         segments = [whole[one] if one in whole else store.segments.get(one) for one in plan.segments]
         raise _ToProcessError(_run(store, plan, segments))

@@ -223,11 +223,15 @@ SPARSE = 16
 class Plan:
     """Segments that are to be processed upon the state after ``base`` (None: upon that of a glider of which
     nothing is known), in order of time. ``revision`` counts the transactions that changed what is held of
-    the glider: two plans of equal revision and segments lead to equal outcomes."""
+    the glider: two plans that are equal lead to equal outcomes."""
 
     base: SegmentId | None
     segments: tuple[SegmentId, ...]
     revision: int
+
+    def is_as(self, other: Plan) -> bool:
+        """Whether the outcomes of the other plan are those of this one."""
+        return self.revision == other.revision and self == other
 
 
 class Segments:
