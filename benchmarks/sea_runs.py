@@ -204,7 +204,7 @@ def run(job: Job, *, direct: bool = False) -> Result:
         store.segments.following = _MANY
     messages = [
         Message((a.time - start) / HOUR, (max(a.time, at) - start) / HOUR, str(a.kind), a.title)
-        for at, a in _fed(store, flown, params)
+        for at, a in fed(store, flown, params)
         if a.kind not in _NOT_MESSAGES
     ]
     dives, expected = store.assessments(glider), store.forecasts(glider)
@@ -265,7 +265,7 @@ def _result(
     )
 
 
-def _fed(store: Store, flown: Flight, params: GliderParams) -> Iterator[tuple[float, Alert]]:
+def fed(store: Store, flown: Flight, params: GliderParams) -> Iterator[tuple[float, Alert]]:
     """Each message with the time (s) at which it could be told, in order; silences come between files."""
     glider, clock = flown.segments[0].id.glider, flown.on_shore[0]
     for segment, at in zip(flown.segments, flown.on_shore, strict=True):

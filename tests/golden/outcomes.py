@@ -2,6 +2,7 @@
 
     python tests/golden/outcomes.py OUT [--only NAME ...]
     python tests/golden/outcomes.py --compare A B [--map tests/golden/renamed.yml] [--without alerts.body ...]
+                                      [--within 1e-9]
 
 The first writes the assessments, incidents, expected surfacings and alerts of each mission as lines of JSON
 (keys sorted, floats by `repr`, so that equal lines are equal to the bit), and OUT/sha256.txt; it takes a
@@ -16,6 +17,7 @@ The second compares two such folders and ends with 1 where they differ. The map 
     added: [evidence.new]                   # not compared: B alone has it
     factors: {evidence.old_h: 3600}         # A's value times this, compared to 12 digits (before `keys`)
 
+`--within` lets numbers differ by this part of them: for a change of the order in which floats are added.
 A path is the kind of line (assessments, incidents, expected, alerts) and the keys below it, without indices.
 """
 
@@ -30,6 +32,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import zip_longest
+from math import isclose
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -240,8 +243,8 @@ class Renamed:
         return msgspec.convert(YAML(typ="safe").load(path.read_text(encoding="utf-8")) or {}, cls)
 
 
-def compare(a: Path, b: Path, renamed: Renamed, without: tuple[str, ...]) -> int:
-    """Print what differs between two folders; how many missions do."""
+def compare(a: Path, b: Path, renamed: Renamed, without: tuple[str, ...], within: float = 0.0) -> int:
+    """Print what differs between two folders by more than `within` (part of a number); how many missions do."""
     names = sorted({path.name for folder in (a, b) for path in folder.glob("*.jsonl")})
     if not names:
         raise SystemExit(f"nothing to compare in {a} and {b}")
@@ -253,7 +256,7 @@ def compare(a: Path, b: Path, renamed: Renamed, without: tuple[str, ...]) -> int
             continue
         old = [_left(line, renamed, without) for line in _lines(a / name)]
         new = [_right(line, renamed, without) for line in _lines(b / name)]
-        found = list(_differences(old, new))
+        found = list(_differences(old, new, within))
         if found:
             different += 1
             print(f"{name}: {len(found)} differences in {len(old)} and {len(new)} lines")
@@ -314,7 +317,7 @@ def _ends(path: tuple[str, ...], ending: str) -> bool:
     return path[-len(parts) :] == parts
 
 
-def _differences(old: Iterable[Line], new: Iterable[Line]) -> Iterator[str]:
+def _differences(old: Iterable[Line], new: Iterable[Line], within: float) -> Iterator[str]:
     """`LINE PATH: this, that`, one for each value that differs."""
     for i, (one, other) in enumerate(zip_longest(old, new), start=1):
         if one is None or other is None:
@@ -323,16 +326,21 @@ def _differences(old: Iterable[Line], new: Iterable[Line]) -> Iterator[str]:
         if one["kind"] != other["kind"]:
             yield f"{i} kind: {one['kind']}, {other['kind']}"
             continue
-        yield from (f"{i} {each}" for each in _unlike(one["value"], other["value"], one["kind"]))
+        yield from (f"{i} {each}" for each in _unlike(one["value"], other["value"], one["kind"], within))
 
 
-def _unlike(one: Any, other: Any, path: str) -> Iterator[str]:
+def _unlike(one: Any, other: Any, path: str, within: float) -> Iterator[str]:
     if isinstance(one, dict) and isinstance(other, dict):
         for key in sorted({*one, *other}):
             if key not in one or key not in other:
                 yield f"{path}.{key}: only in {'A' if key in one else 'B'}"
             else:
-                yield from _unlike(one[key], other[key], f"{path}.{key}")
+                yield from _unlike(one[key], other[key], f"{path}.{key}", within)
+    elif isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
+        for a, b in zip(one, other, strict=True):
+            yield from _unlike(a, b, path, within)
+    elif isinstance(one, float) and isinstance(other, float) and isclose(one, other, rel_tol=within):
+        return
     elif json.dumps(one) != json.dumps(other):  # NaN is like itself, 1 is not like 1.0
         yield f"{path}: {json.dumps(one)[:120]}, {json.dumps(other)[:120]}"
 
@@ -347,9 +355,11 @@ def main() -> None:
     parser.add_argument("--compare", nargs=2, type=Path, metavar=("A", "B"))
     parser.add_argument("--map", type=Path, metavar="YAML")
     parser.add_argument("--without", nargs="+", default=[], metavar="PATH", help="as alerts.body")
+    parser.add_argument("--within", type=float, default=0.0, metavar="PART", help="of a number, as 1e-9")
     asked = parser.parse_args()
     if asked.compare is not None:
-        sys.exit(1 if compare(*asked.compare, Renamed.read(asked.map), tuple(asked.without)) else 0)
+        renamed, without = Renamed.read(asked.map), tuple(asked.without)
+        sys.exit(1 if compare(*asked.compare, renamed, without, asked.within) else 0)
     if asked.out is None:
         parser.error("OUT or --compare A B")
     write(asked.out, asked.only)

@@ -183,8 +183,8 @@ class TestPrior:
         state = kalman.init(params, EAST.t_dive)
         state = replace(state, x=readonly([*state.x[:-2], 0.2, 0.1]), cov=readonly(1e-12 * state.cov))
         seen = observe(EAST)
-        passage = kalman._passage(state, seen, 27.5, params)
-        after = kalman._predicted(state, seen, passage, params)
+        passage = kalman._passage(state, seen.start, seen.end, 27.5, params)
+        after = kalman._predicted(state, seen.end, tuple(seen.ground), passage, params)
         assert math.sqrt(after.cov[OWN, OWN]) == pytest.approx(0.015, rel=0.01)
         fades = math.exp(-3 / 24 / 30)
         assert after.x[[SLIP, SIDE]] == pytest.approx([0.2 * fades, 0.1 * fades])
@@ -516,8 +516,7 @@ class TestOpened:
     def test_a_wing_opens_slip_and_half_of_it_side(self):
         state = kalman.init(JointParams(), 0.0)
         (wing,) = (way for way in self.explained() if way.cause is Cause.WING)
-        steps_of_flow = kalman._jump(JointParams().flow)
-        opened = kalman._cov(state, wing, steps_of_flow) - state.cov
+        opened = kalman._cov(state, wing, kalman._jumped(JointParams().flow)) - state.cov
         assert np.sqrt(opened[[SLIP, SIDE], [SLIP, SIDE]]) == pytest.approx([0.27, 0.15])
 
 

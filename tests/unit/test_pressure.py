@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gliderwatch.model import Series, readonly
-from gliderwatch.navigation.fixes import LEAST, zeroed
+from gliderwatch.navigation.fixes import LEAST, new_fixes, zeroed
 from gliderwatch.navigation.flight import prepare
 from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
@@ -74,11 +74,12 @@ def test_an_old_fix_that_is_reported_under_water_is_none():
             "fix_lon": [(300.0, -70.0), (310.0, -70.0)],
         },
     )
-    assert zeroed(prepare(s, 0.0), None, 0.0)[1] == 0.0
+    samples = prepare(s, 0.0)
+    assert zeroed(samples, new_fixes(samples, None), 0.0)[1] == 0.0
 
 
 def test_a_segment_without_a_fix_has_the_offset_of_the_one_before():
     s = segment("unit-2023-318-0-1", 0.0, {"depth": [(float(t), 5.0) for t in range(0, 600, 30)]})
-    samples, known = zeroed(prepare(s, 0.0), None, 5.0)
+    samples, known = zeroed(prepare(s, 0.0), [], 5.0)
     assert known == 5.0
     assert np.abs(samples["depth"].v).max() < LEAST

@@ -8,10 +8,13 @@ first ones if they will do, because growth that slows a glider over weeks is not
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import compress
 from math import isfinite
 from statistics import median
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,12 +72,14 @@ QUANTITIES = (
 """Names and units: `docs/nomenclature.md`."""
 _DEPTH = Quantity("depth_max", least=DEPTH_RANGE, part=RATE_RANGE)
 _BY_NAME = {q.name: q for q in (*QUANTITIES, _DEPTH)}
+_GIVEN = tuple(dict.fromkeys(q.given for q in QUANTITIES))
 _COLUMN = {name: i for i, name in enumerate((*_BY_NAME, "thruster"))}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Baseline:
-    """Healthy dives of one deployment, oldest first.
+    """Healthy dives of one deployment, oldest first. It equals none but itself, so that what follows from it
+    can be kept: a dive comes again when its current is corrected.
 
     ``dives`` ((k, n), k at most `BASELINE_MOST`) has a column for each of `QUANTITIES`, for the depth reached
     and for the thruster; ``known`` (the same shape) is 1 where a dive tells, else 0.
@@ -94,6 +99,7 @@ class Usual:
     high: float
 
 
+@lru_cache(maxsize=64)
 def learn(baseline: Baseline, features: DiveFeatures) -> Baseline:
     """The baseline with one more dive. Only for dives that are healthy, and not while an incident is open.
 
@@ -111,20 +117,24 @@ def learn(baseline: Baseline, features: DiveFeatures) -> Baseline:
     return Baseline(readonly(np.where(known, dives, 0.0)), readonly(known))
 
 
-def compare(baseline: Baseline, features: DiveFeatures) -> dict[str, Usual]:
+@lru_cache(maxsize=64)
+def compare(baseline: Baseline, features: DiveFeatures) -> Mapping[str, Usual]:
     """The numbers of a dive of which enough healthy dives tell what is usual, by name."""
     if features.duration < BRIEF:
-        return {}
+        return MappingProxyType({})
     row = _row(features)
     dives = _dives(baseline)
     dives = dives[_same_setting(dives, row)]
-    same = {given: _same_trim(dives, row, given) for given in {q.given for q in QUANTITIES}}
+    known = np.isfinite(dives)
+    same = {given: _same_trim(dives, row, given) for given in _GIVEN}
     out = {}
-    for quantity, value, values in zip(QUANTITIES, row.tolist(), dives.T.tolist(), strict=False):
-        usual = _usual(values, same[quantity.given], quantity) if isfinite(value) else None
-        if usual is not None:
-            out[quantity.name] = Usual(value, *usual)
-    return out
+    for i, (quantity, value) in enumerate(zip(QUANTITIES, row.tolist(), strict=False)):
+        if isfinite(value):
+            tells = known[:, i]
+            usual = _usual(dives[tells, i].tolist(), same[quantity.given][tells].tolist(), quantity)
+            if usual is not None:
+                out[quantity.name] = Usual(value, *usual)
+    return MappingProxyType(out)
 
 
 def evidence_of(baseline: Baseline, features: DiveFeatures) -> dict[str, float]:
@@ -182,15 +192,13 @@ def _same_setting(dives: Array, row: Array) -> NDArray[np.bool_]:
     return np.asarray((np.abs(dives[:, at] - row[at]) < LIKE) & ((dives[:, at] > 0) == (row[at] > 0)))
 
 
-def _usual(values: list[float], same: list[bool], quantity: Quantity) -> tuple[float, float, float] | None:
-    """Low, usual and high value of a number among dives, None where too few tell.
+def _usual(known: list[float], alike: list[bool], quantity: Quantity) -> tuple[float, float, float] | None:
+    """Low, usual and high value of a number among the dives that tell it, None where they are too few.
 
-    ``values`` of each dive, NaN where it does not tell; ``same``: whether it was at the same trim.
+    ``alike``: whether each was at the same trim.
     """
-    known = [value for value in values if isfinite(value)]
     windows = [known[:BASELINE_FIRST], known[-BASELINE_RECENT:]]
     if quantity.given:
-        alike = [each for value, each in zip(values, same, strict=True) if isfinite(value)]
         first = list(compress(known[:BASELINE_FIRST], alike))
         # the first dives alone, so that what grows slowly is not usual in the end
         windows = [first if len(first) >= BASELINE_LEAST else list(compress(known, alike))]
@@ -202,14 +210,14 @@ def _usual(values: list[float], same: list[bool], quantity: Quantity) -> tuple[f
     return min(low for low, _, _ in ranges), ranges[-1][1], max(high for _, _, high in ranges)
 
 
-def _same_trim(dives: Array, row: Array, given: tuple[str, ...]) -> list[bool]:
+def _same_trim(dives: Array, row: Array, given: tuple[str, ...]) -> NDArray[np.bool_]:
     """Whether each dive had the same of what a number depends on, as far as both tell."""
     same = np.ones(len(dives), dtype=bool)
     for name in given:
         quantity, column = _BY_NAME[name], _COLUMN[name]
         apart = np.abs(dives[:, column] - row[column])
         same &= ~(apart > max(quantity.least, quantity.part * abs(row[column])))
-    return same.tolist()
+    return same
 
 
 def _range(values: list[float], quantity: Quantity) -> tuple[float, float, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -128,9 +128,9 @@ class JointParams:
     alarms_per_month: float = 0.05
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class JointState:
-    """What is known after a dive.
+    """What is known after a dive. A state equals none but itself, so that what follows from it can be kept.
 
     ``t`` end of the last dive (s), ``x`` ((n,)) and ``cov`` ((n, n)) of the state; ``process_scale`` factor
     on the variance of the flow's changes and ``measurement_scale`` on that of the measurements, both learnt
@@ -226,8 +226,8 @@ def step(
     seen = observe(dive)
     if state is None:
         state = init(params, seen.start)
-    passage = _passage(state, seen, dive.start.lat, params)
-    state = _predicted(state, seen, passage, params)
+    passage = _passage(state, seen.start, seen.end, dive.start.lat, params)
+    state = _predicted(state, seen.end, tuple(seen.ground.tolist()), passage, params)
     slipping = Slipping(params.slip * seen.slip, math.sqrt(state.tested) * params.own_noise, usual)
     found = _explained(state, Measured(seen, kinematic, state.tested, slipping), params, hint)
     believed = seen.own_speed()
@@ -235,7 +235,7 @@ def step(
     loss, turn, bank = _tested(state, found, passage, params)
     # where no heading was measured, what looks like a step is a turn that was not seen
     proven = None if seen.is_free else step_test.proven(loss, turn, params.alarms_per_month)
-    after = _learnt(state, _mixed(state, found.ways, _jump(params.flow)), found, passage, across)
+    after = _learnt(state, _mixed(state, found.ways, _jumped(params.flow)), found, passage, across)
     after = _opened(replace(after, bank=bank, end=dive.end), proven)
     return after, JointInfo(
         seen=seen,
@@ -255,9 +255,9 @@ def step(
 
 def _explained(state: JointState, measured: Measured, params: JointParams, hint: Mode | None) -> Explanations:
     """A dive in all modes; ``hint``: also in this one."""
-    steps, shown = _jump(params.flow)[-SHOWN:], state.cov[-SHOWN:, -SHOWN:]
+    jumped, shown = _jumped(params.flow)[-SHOWN:, -SHOWN:], state.cov[-SHOWN:, -SHOWN:]
     modes = (*switched(params.modes, state.wrong), *((hint,) if hint else ()))
-    return Explanations.of(explain(state.x[-SHOWN:], shown, steps @ steps.T, measured, modes))
+    return Explanations.of(explain(state.x[-SHOWN:], shown, jumped, measured, modes))
 
 
 def _tested(
@@ -269,14 +269,16 @@ def _tested(
     """
     way = found.usual if found.usual is not None and found.best.cause is Cause.FLOW else found.best
     steps = _jump(params.flow)
-    update = _update(state, way, steps)
+    update = _update(state, way, _jumped(params.flow))
     return step_test.steps(state.bank, passage_matrix(passage), update, steps, params.front, state.dives)
 
 
-def _passage(state: JointState, seen: Observation, lat: float, params: JointParams) -> Passage:
-    """What the time from the last dive to the end of this one makes of the flow."""
+@lru_cache(maxsize=64)  # a dive comes again when its current is corrected
+def _passage(state: JointState, start: float, end: float, lat: float, params: JointParams) -> Passage:
+    """What the time from the last dive to the end of this one, from ``start`` to ``end`` (s), makes of the
+    flow."""
     q = gauss_markov.intensities(state.x[: params.flow.size], state.process_scale, params.flow)
-    return gauss_markov.passage(max(seen.start - state.t, 0.0), seen.end - seen.start, lat, q, params.flow)
+    return gauss_markov.passage(max(start - state.t, 0.0), end - start, lat, q, params.flow)
 
 
 def passage_matrix(passage: Passage) -> Array:
@@ -293,9 +295,20 @@ def _jump(params: FlowParams) -> Array:
     return readonly(np.concatenate([gauss_markov.jump(params), np.zeros((3, 2))]))
 
 
-def _predicted(state: JointState, seen: Observation, passage: Passage, params: JointParams) -> JointState:
-    """The state at the end of a dive, before what it measures."""
-    dt = max(seen.end - state.t, 0.0)
+@cache
+def _jumped(params: FlowParams) -> Array:
+    """The covariance of the whole state where the flow steps by 1 m/s, (n, n)."""
+    steps = _jump(params)
+    return readonly(steps @ steps.T)
+
+
+@lru_cache(maxsize=64)
+def _predicted(
+    state: JointState, end: float, ground: tuple[float, ...], passage: Passage, params: JointParams
+) -> JointState:
+    """The state at the ``end`` (s) of a dive with a velocity over ``ground`` (m/s), before what it
+    measures."""
+    dt = max(end - state.t, 0.0)
     matrix, n = passage_matrix(passage), params.flow.size
     fades = math.exp(-dt / params.slip_memory)
     matrix[[SLIP, SIDE], [SLIP, SIDE]] = fades
@@ -307,15 +320,15 @@ def _predicted(state: JointState, seen: Observation, passage: Passage, params: J
         *kept,
     ]
     before = state.x[: params.flow.size]
-    crossed = gauss_markov.crossing(before[0:2] + before[2:4], seen.ground, dt, params.flow)
-    steps = _jump(params.flow)
-    cov = matrix @ state.cov @ matrix.T + noise + state.process_scale * crossed**2 * (steps @ steps.T)
-    return replace(state, t=seen.end, x=matrix @ state.x, cov=(cov + cov.T) / 2)
+    crossed = gauss_markov.crossing(before[0:2] + before[2:4], ground, dt, params.flow)
+    jumped = _jumped(params.flow)
+    cov = matrix @ state.cov @ matrix.T + noise + state.process_scale * crossed**2 * jumped
+    return replace(state, t=end, x=readonly(matrix @ state.x), cov=readonly((cov + cov.T) / 2))
 
 
-def _update(state: JointState, way: Explained, steps: Array) -> Update:
+def _update(state: JointState, way: Explained, jumped: Array) -> Update:
     """The update of the whole state that one explanation of a dive makes."""
-    return _update_of(_cov(state, way, steps), way)
+    return _update_of(_cov(state, way, jumped), way)
 
 
 def _update_of(cov: Array, way: Explained) -> Update:
@@ -326,10 +339,10 @@ def _update_of(cov: Array, way: Explained) -> Update:
     return Update(rows, turned @ way.weight_matrix, way.weight_matrix, way.innovation)
 
 
-def _cov(state: JointState, way: Explained, steps: Array) -> Array:
+def _cov(state: JointState, way: Explained, jumped: Array) -> Array:
     """The covariance of the whole state with what an explanation opens."""
     if way.cause is Cause.FLOW:
-        return state.cov + way.mode.size**2 * (steps @ steps.T)
+        return state.cov + way.mode.size**2 * jumped
     if way.cause is Cause.SPEED:
         cov = state.cov.copy()
         cov[OWN, OWN] += way.mode.size**2
@@ -341,13 +354,13 @@ def _cov(state: JointState, way: Explained, steps: Array) -> Array:
     return state.cov
 
 
-def _mixed(state: JointState, ways: list[Explained], steps: Array) -> JointState:
+def _mixed(state: JointState, ways: list[Explained], jumped: Array) -> JointState:
     """The state after a dive: the mixture of what it is under each explanation."""
     kept = [way for way in ways if way.weight > RARE]
     total = sum(way.weight for way in kept)
     means, covs = [], []
     for way in kept:
-        cov = _cov(state, way, steps)
+        cov = _cov(state, way, jumped)
         update = _update_of(cov, way)
         mean = state.x + update.gain @ way.innovation
         mean[SLIP] += way.mode.loss
@@ -461,10 +474,9 @@ def expected_flow(
     n, lat = params.size, 0.0 if state.end is None else state.end.lat
     q = gauss_markov.intensities(state.x[:n], state.process_scale, params)
     passage = gauss_markov.passage(max(start - state.t, 0.0), max(end - start, 1.0), lat, q, params)
-    mean = passage.matrix @ state.x[:n]
-    cov = passage.matrix @ state.cov[:n, :n] @ passage.matrix.T + passage.noise
+    at = params.mean
+    rows = passage.matrix[at]  # those of the mean flow alone
+    cov = rows @ state.cov[:n, :n] @ rows.T + passage.noise[at, at]
     now = state.x[0:2] + state.x[2:4]
     crossed = gauss_markov.crossing(now, ground, max((start + end) / 2 - state.t, 0.0), params)
-    return mean[params.mean], np.asarray(
-        cov[params.mean, params.mean] + state.process_scale * crossed**2 * np.eye(2)
-    )
+    return rows @ state.x[:n], np.asarray(cov + state.process_scale * crossed**2 * np.eye(2))

@@ -41,7 +41,7 @@ from gliderwatch.estimation.constants import (
     WING_SLIP,
 )
 from gliderwatch.estimation.dive_measurement import OWN, SIDE, SLIP, Measured, expected
-from gliderwatch.model import Array
+from gliderwatch.model import Array, readonly
 
 
 class Cause(StrEnum):
@@ -114,6 +114,9 @@ def _with_chances(modes: tuple[Mode, ...], chances: tuple[tuple[Cause, float], .
     )
 
 
+_LOWEST = readonly([0.0, LEAST_SLIP, -MOST_SIDE])
+_HIGHEST = readonly([FASTEST, MOST_SLIP, MOST_SIDE])
+"""What W (m/s), slip and side can be."""
 ROLLED = Mode(Cause.WING, WING_ODDS, WING_SLIP)
 """Beside these where the glider has just begun to roll otherwise, which little else does. ``size`` is of
 slip."""
@@ -190,7 +193,7 @@ def explain(
     fits = (True, False) if kinematic is not None else (False,)
     each = [(mode, fits_it) for mode in modes for fits_it in fits]
     opened, wrong, logs = _opened(each, cov, jumped, measured)
-    before, values = np.tile(x, (len(each), 1)), measured.values
+    before, values = np.repeat(x[None], len(each), axis=0), measured.values
     before[:, SLIP] += [mode.loss for mode, _ in each]
     state = before
     for _ in range(ITERATIONS):
@@ -202,10 +205,9 @@ def explain(
         innovation = values - found - (slope @ (before - state)[:, :, None])[:, :, 0]
         state = before + (turned @ (inverse @ innovation[:, :, None]))[:, :, 0]
         free = state[:, OWN].copy()
-        state[:, OWN] = np.clip(free, 0.0, FASTEST)
-        state[:, SLIP:] = np.clip(state[:, SLIP:], [LEAST_SLIP, -MOST_SIDE], [MOST_SLIP, MOST_SIDE])
+        np.minimum(np.maximum(state[:, OWN:], _LOWEST), _HIGHEST, out=state[:, OWN:])
     beyond = np.maximum(np.maximum(-free, free - FASTEST), 0.0)
-    squares = np.einsum("ki,kij,kj->k", innovation, inverse, innovation)
+    squares = (innovation[:, None, :] @ inverse @ innovation[:, :, None])[:, 0, 0]
     weights = _weights(logs, beyond, np.linalg.slogdet(s)[1] + squares)
     left_out = wrong > 0
     noise = np.where(left_out, LEFT_OUT**2, noise)
@@ -232,7 +234,8 @@ def _opened(
     """Covariances of the state ((k, 5, 5)), what is added to the noise ((k, m, m)), and logarithms of the
     chances ((k,)), of modes and of whether the speed that the glider tells fits."""
     kinematic, m = measured.kinematic, len(measured.values)
-    opened, wrong, logs = np.tile(cov, (len(each), 1, 1)), np.zeros((len(each), m, m)), np.zeros(len(each))
+    opened, wrong = np.repeat(cov[None], len(each), axis=0), np.zeros((len(each), m, m))
+    logs = np.zeros(len(each))
     for k, (mode, fits_it) in enumerate(each):
         logs[k] = log(mode.chance)
         if mode.cause is Cause.SPEED:
@@ -240,10 +243,11 @@ def _opened(
         elif mode.cause is Cause.FLOW:
             opened[k] += mode.size**2 * jumped
         elif mode.cause is Cause.WING:
-            opened[k][[SLIP, SIDE], [SLIP, SIDE]] += np.square([mode.size, WING_SIDE])
+            opened[k, SLIP, SLIP] += mode.size**2
+            opened[k, SIDE, SIDE] += WING_SIDE**2
         elif mode.cause.is_error:
-            at = slice(2, 4) if mode.cause is Cause.CURRENT else slice(0, 2)
-            wrong[k, at, at] = mode.size**2 * np.eye(2)
+            at = 2 if mode.cause is Cause.CURRENT else 0
+            wrong[k, at, at] = wrong[k, at + 1, at + 1] = mode.size**2
         if kinematic is not None:
             logs[k] += log(1 - kinematic.lies) if fits_it else log(kinematic.lies)
             if not fits_it:  # it may be anything: of density 1 / FASTEST

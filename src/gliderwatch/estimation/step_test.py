@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from gliderwatch.model import Array, readonly
 # direction. Both are set by how often they may cry wolf.
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Bank:
     """Hypotheses of a step, one for each recent dive and one for some of the older ones, oldest first.
 
@@ -133,21 +133,24 @@ def likeliest(bank: Bank, which: int, sign: int = 0) -> Step | None:
     """
     if not len(bank.score):
         return None
-    rest = [i for i in range(bank.score.shape[1]) if i != which]
-    cross = bank.info[:, [which]][:, :, rest]
-    used = np.linalg.solve(bank.info[:, rest][:, :, rest], np.swapaxes(cross, 1, 2)).swapaxes(1, 2)
-    info = bank.info[:, which, which] - (used @ np.swapaxes(cross, 1, 2))[:, 0, 0]
-    score = bank.score[:, which] - (used @ bank.score[:, rest, None])[:, 0, 0]
-    ratio = np.where(score * sign >= 0, score**2 / info, 0.0)
+    sizes, variances = (each[:, which] for each in _sizes(bank))
+    ratio = np.where(sizes * sign >= 0, sizes**2 / variances, 0.0)
     k = int(ratio.argmax())
     return Step(
         ratio=float(ratio[k]),
         which=which,
-        sigma=float(info[k]) ** -0.5,
+        sigma=float(variances[k]) ** 0.5,
         shifts=bank.shift[k],
         info=bank.info[k],
         score=bank.score[k],
     )
+
+
+@lru_cache(maxsize=2)  # asked for a loss and for a turn
+def _sizes(bank: Bank) -> tuple[Array, Array]:
+    """The likeliest value of each number under each hypothesis, and its variance: (k, q) each."""
+    cov = np.linalg.inv(bank.info)
+    return (cov @ bank.score[:, :, None])[:, :, 0], cov.diagonal(axis1=1, axis2=2)
 
 
 def ratio_bound(alarms_per_month: float) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from statistics import median
 
 import numpy as np
@@ -44,7 +45,7 @@ from gliderwatch.forecast.constants import (
 )
 from gliderwatch.forecast.steering import UNSENT, WAYS, Leg, Plan, courses
 from gliderwatch.forecast.timing import quantile
-from gliderwatch.model import Array, Dive, Fix, NextSurfacing, Segment, Unusable
+from gliderwatch.model import Array, Dive, Fix, NextSurfacing, Segment, Unusable, readonly
 from gliderwatch.navigation.flight import joined
 from gliderwatch.navigation.geodesy import displacement, from_plane, to_plane
 
@@ -98,13 +99,15 @@ def is_same(a: Place, b: Place) -> bool:
     return a == b or float(np.hypot(*displacement(*a, *b))) < SAME_WAYPOINT
 
 
+@lru_cache(maxsize=64)  # asked for four times a dive
 def goals(state: Surfacings) -> tuple[Array, ...]:
     """The waypoint, and the one that came after it when the glider last went there (m from the fix, (2,))."""
     if state.fix is None or not state.waypoints:
         return ()
     *past, now = state.waypoints
     after = [b for a, b in zip(past, state.waypoints[1:], strict=True) if is_same(a, now)]
-    return tuple(displacement(*place, state.fix.lat, state.fix.lon) for place in (now, *after[-1:]))
+    lat, lon = state.fix.lat, state.fix.lon
+    return tuple(readonly(displacement(*place, lat, lon)) for place in (now, *after[-1:]))
 
 
 def bearing(state: Surfacings) -> float | None:

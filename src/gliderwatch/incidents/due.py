@@ -139,7 +139,7 @@ def _of_health(
     now: float,
 ) -> tuple[NotificationState, list[Notice]]:
     """What the rules of health found; the fix is asked for where there is anything to say."""
-    if not notified.health and not any(found for _, judged in rows for found in judged.values()):
+    if not notified.health and not any(any(judged.values()) for _, judged in rows):
         return notified, []
     fix = facts.last_fix(now - GONE)
     threads, notices = health.announce(

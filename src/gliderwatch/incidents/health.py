@@ -33,20 +33,23 @@ from gliderwatch.model import Assessment, Fix, Incident, Kind, Severity
 def health_incidents(glider: str, rows: Iterable[tuple[float, Judged]]) -> tuple[HealthIncident, ...]:
     """The incidents of a glider by what the rules found in its segments and calls, in order of time (s)."""
     done: list[HealthIncident] = []
-    open_: dict[str, HealthIncident] = {}
+    open_: dict[str, list[tuple[float, Finding]]] = {}
     normal: dict[str, int] = {}
     needed = {rule.name: rule.clear_after for rule in RULES}
     for t, judged in rows:
         for rule, finding in judged.items():
             before = open_.get(rule)
+            if finding is None and before is None:
+                continue  # nothing is open, nothing opens: as nearly always
             phase = Phase.OK if before is None else Phase.OPEN
-            normal[rule] = 0 if finding is not None else normal.get(rule, 0) + 1
+            normal[rule] = 0 if finding is not None else normal[rule] + 1
             after = TRANSITIONS[phase, _event(phase, finding, normal[rule] >= needed.get(rule, 1))]
             if finding is not None:
-                open_[rule] = _opened(glider, t, finding) if before is None else _worse(before, finding)
-            elif before is not None and after is Phase.OK:
-                done.append(replace(open_.pop(rule), cleared_at=t))
-    return tuple(sorted((*done, *open_.values()), key=lambda i: (i.opened_at, i.id)))
+                open_.setdefault(rule, []).append((t, finding))
+            elif after is Phase.OK:
+                done.append(_incident(glider, open_.pop(rule), cleared_at=t))
+    still = (_incident(glider, found, None) for found in open_.values())
+    return tuple(sorted((*done, *still), key=lambda i: (i.opened_at, i.id)))
 
 
 def _event(phase: Phase, finding: Finding | None, is_normal: bool) -> Event:
@@ -56,16 +59,16 @@ def _event(phase: Phase, finding: Finding | None, is_normal: bool) -> Event:
     return Event.CLEARED if phase is Phase.OPEN and is_normal else Event.NORMAL
 
 
-def _opened(glider: str, t: float, finding: Finding) -> HealthIncident:
-    identity = f"{glider}/health/{finding.rule}/{finding.t:.0f}"
+def _incident(
+    glider: str, found: Sequence[tuple[float, Finding]], cleared_at: float | None
+) -> HealthIncident:
+    """The incident of what a rule found in a row of segments and calls, each with its time (s)."""
+    opened_at, first = found[0]
+    worst, last = max((each for _, each in found), key=lambda each: each.severity), found[-1][1]
+    identity = f"{glider}/health/{first.rule}/{first.t:.0f}"
     return HealthIncident(
-        identity, glider, finding.rule, finding.severity, finding.t, t, None, finding, finding
+        identity, glider, first.rule, worst.severity, first.t, opened_at, cleared_at, worst, last
     )
-
-
-def _worse(before: HealthIncident, finding: Finding) -> HealthIncident:
-    worst = finding if finding.severity > before.severity else before.worst
-    return replace(before, severity=worst.severity, worst=worst, last=finding)
 
 
 # ----------------------------------------

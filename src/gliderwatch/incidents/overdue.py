@@ -317,11 +317,25 @@ def next_tick(
     overdue_hours: float | None,
     now: float,
     back: float | None = None,
+    until: float = inf,
 ) -> float | None:
-    """When `tick` has something to report next (s) if nothing comes until then; None: never. `back` is as in
-    `Fleet`."""
+    """When `tick` has something to report next (s) if nothing comes until then; None: never, or only after
+    `until` (s). `back` is as in `Fleet`."""
+    if until < _earliest(silences, facts, overdue_hours, now):
+        return None
     silence = _going_on(silences, facts, overdue_hours, now)
     return None if silence is None else max(silence.missed.stage(silence.stages), _patience(silence, back))
+
+
+def _earliest(
+    silences: tuple[Silence, ...], facts: SilenceFacts, overdue_hours: float | None, now: float
+) -> float:
+    """A time (s) before which nothing is to be reported, whatever the signs of life are: they are many, and
+    can only put the next call off and widen the margin."""
+    expected = facts.expected(now)
+    if expected is None or any(s.called is None for s in silences):
+        return -inf
+    return expected.t + margin(expected, (), now, overdue_hours)
 
 
 def _patience(silence: Silence, back: float | None) -> float:

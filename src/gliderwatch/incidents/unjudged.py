@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Protocol
 
 from gliderwatch.incidents.constants import (
@@ -83,12 +84,14 @@ def _run(items: Iterable[Unjudged], apart: float, now: float) -> tuple[Unjudged,
     Each ends where the next begins: a file that was not decoded may have come late.
     """
     run: list[Unjudged] = []
+    ended = -inf  # of all in the run before the last one
     for item in sorted(items, key=lambda i: (i.start, i.end)):
-        if run and item.start - _end(run) > apart:
-            run = []
+        if run and item.start - max(ended, run[-1].end) > apart:
+            run, ended = [], -inf
         if run and run[-1].end > item.start:
             run[-1] = replace(run[-1], end=item.start)
-        run.append(replace(item, end=min(item.end, now)))
+        ended = max(ended, run[-1].end) if run else -inf
+        run.append(item if item.end <= now else replace(item, end=now))
     return tuple(run)
 
 

@@ -191,8 +191,10 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
     """
     state = _with_declination(state, segment)
     fresh = prepare(segment, state.declination or 0.0)
-    state, step = _with_clock(state, segment, fresh)
-    fresh, surface = zeroed(fresh, state.fix, state.surface_depth)
+    fixes = new_fixes(fresh, state.fix)
+    state, step = _with_clock(state, segment, fixes)
+    fixes = new_fixes(fresh, state.fix) if step else fixes
+    fresh, surface = zeroed(fresh, fixes, state.surface_depth)
     state = replace(state, surface_depth=surface)
     samples = concatenated(state.carry, fresh)
     reports, last_reported = new_reports(segment, state.declination or 0.0, state.known)
@@ -201,7 +203,8 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
     state = replace(_placed(state, segment, fresh, quality), known=last_reported)
 
     before = state.dive
-    fixes = new_fixes(samples, state.fix)
+    if "fix_lat" in state.carry:
+        fixes = new_fixes(samples, state.fix)
     state, finished = _withdraw_old_fix(state, fixes)
     untold = [state.untold] if state.untold is not None else []
     for first, last in surface_intervals(fixes, SHORTEST_DIP):
@@ -280,15 +283,14 @@ def follows(before: str, name: str) -> bool:
     return int(number) == int(number_before) + 1
 
 
-def _with_clock(state: Navigation, segment: Segment, fresh: Samples) -> tuple[Navigation, float]:
-    """The state by the clock of a segment, where that was set forward before it, and by how much (s).
+def _with_clock(state: Navigation, segment: Segment, fixes: list[Fix]) -> tuple[Navigation, float]:
+    """The state by the clock of a segment with new ``fixes``, where that was set forward before it, and by
+    how much (s).
 
     Nothing comes between two segments of consecutive numbers. Where the glider was at the surface at the end
     of one and at the beginning of the next, and near enough, the hours between the two are none.
     """
-    step = forward_step(
-        state.latest, state.last_t, state.fix, segment.id, next(iter(new_fixes(fresh, state.fix)), None)
-    )
+    step = forward_step(state.latest, state.last_t, state.fix, segment.id, next(iter(fixes), None))
     if not step or state.fix is None or state.last_t is None:
         return state, 0.0
     carry = {name: Series(readonly(s.t + step), s.v) for name, s in state.carry.items()}

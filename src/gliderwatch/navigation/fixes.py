@@ -120,15 +120,15 @@ SHALLOW = 0.25
 """Quantile of the depths at the surface that is taken: some are of the first metres of a dive."""
 
 
-def zeroed(fresh: Samples, last: Fix | None, before: float) -> tuple[Samples, float]:
+def zeroed(fresh: Samples, fixes: list[Fix], before: float) -> tuple[Samples, float]:
     """The samples of a segment with depths from the surface, and what its sensor shows at the surface (m).
 
-    That is seen at the fixes after the ``last`` of before; without them it is as ``before``. 0: near enough.
+    That is seen at its new ``fixes``; without them it is as ``before``. 0: near enough.
     """
     depth = get(fresh, "depth")
     if not len(depth):
         return fresh, before
-    shown = _at_surface(depth, [fix.t for fix in new_fixes(fresh, last)])
+    shown = _at_surface(depth, [fix.t for fix in fixes])
     if shown is not None:
         before = shown if abs(shown) > LEAST else 0.0
     if not before:

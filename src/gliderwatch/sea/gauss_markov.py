@@ -19,9 +19,9 @@ by the water (002).
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,7 +108,7 @@ class FlowParams:
         return slice(self.size - 2, self.size)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Passage:
     """What a gap and the dive after it make of the state: ``matrix`` and ``noise`` ((size, size)).
 
@@ -127,6 +127,7 @@ def prior(params: FlowParams) -> Array:
     return np.concatenate([np.repeat(np.square(sizes), 2), [0.0, 0.0]])
 
 
+@lru_cache(maxsize=256)
 def rates(lat: float, params: FlowParams) -> Complex:
     """i omega - 1 / tau of each part (1/s, (parts,)) at a latitude (degrees)."""
     fixed = [
@@ -134,7 +135,9 @@ def rates(lat: float, params: FlowParams) -> Complex:
         -1 / params.memory,
         -1 / params.inertial_memory - 2j * EARTH * math.sin(math.radians(lat)),
     ]
-    return np.array(fixed + [way * 1j * tide.omega for tide in params.tides for way in (1, -1)])
+    found = np.array(fixed + [way * 1j * tide.omega for tide in params.tides for way in (1, -1)])
+    found.flags.writeable = False
+    return found
 
 
 def intensities(state: Array, sea: float, params: FlowParams) -> Array:
@@ -142,14 +145,22 @@ def intensities(state: Array, sea: float, params: FlowParams) -> Array:
 
     ``sea`` is a factor on those of the parts that are no tides.
     """
-    fixed = [
-        2 * params.lasting**2 / params.lasting_memory,
-        2 * params.passing**2 / params.memory,
-        2 * params.inertial**2 / params.inertial_memory,
-    ]
-    tidal = np.square(state[2 * FIXED : -2]).reshape(-1, 2).mean(axis=1)
+    squares = np.square(state[2 * FIXED : -2])
+    tidal = (squares[::2] + squares[1::2]) / 2
     least = params.tide_least**2
-    return np.concatenate([sea * np.array(fixed), params.tide_wander**2 / DAY * (tidal + least)])
+    return np.concatenate([sea * _fixed(params), params.tide_wander**2 / DAY * (tidal + least)])
+
+
+@cache
+def _fixed(params: FlowParams) -> Array:
+    """q (m2/s3) of the parts that are no tides."""
+    return readonly(
+        [
+            2 * params.lasting**2 / params.lasting_memory,
+            2 * params.passing**2 / params.memory,
+            2 * params.inertial**2 / params.inertial_memory,
+        ]
+    )
 
 
 def passage(gap: float, dive: float, lat: float, q: Array, params: FlowParams) -> Passage:
@@ -162,16 +173,17 @@ def passage(gap: float, dive: float, lat: float, q: Array, params: FlowParams) -
     gained = q * _squared(a, gap)
     phi, square, integral = np.exp(a * dive), _squared(a, dive), _integral(a, dive)
     mean, cross, own = integral / dive, *_wandered(a, dive, square, integral)
-    n, m = params.size, params.parts
-    matrix, noise, each = np.zeros((n, n)), np.zeros((n, n)), np.arange(m)
-    _put(matrix, phi * kept, each, each)
-    _put(matrix, mean * kept, m, each)
-    _put(noise, q * square + gained * np.abs(phi) ** 2, each, each)
-    shared = q * cross / dive + gained * mean * np.conj(phi)
-    _put(noise, shared, m, each)
-    _put(noise, np.conj(shared), each, m)
+    m = params.parts
+    each = np.arange(m)
+    parts = np.zeros((2, m + 1, m + 1), dtype=np.complex128)  # of the matrix, and of the noise
+    parts[0, each, each] = phi * kept
+    parts[0, m, :m] = mean * kept
+    parts[1, each, each] = q * square + gained * np.abs(phi) ** 2
+    parts[1, m, :m] = q * cross / dive + gained * mean * np.conj(phi)
+    parts[1, :m, m] = np.conj(parts[1, m, :m])
     new = q * own / dive**2 + gained * np.abs(mean) ** 2
-    _put(noise, new.sum(), m, m)
+    parts[1, m, m] = new.sum()
+    matrix, noise = _real(parts)
     return Passage(matrix, noise, float(new[:FIXED].sum()))
 
 
@@ -183,13 +195,13 @@ def jump(params: FlowParams) -> Array:
     return readonly(out)
 
 
-def crossing(flow: Array, ground: Array, dt: float, params: FlowParams) -> float:
+def crossing(flow: Array, ground: Iterable[float], dt: float, params: FlowParams) -> float:
     """By how much (m/s) a flow (m/s, (2,)) usually differs after ``dt`` seconds at a velocity over ground.
 
     A strong current is a narrow one: it differs by its own size over a distance of ``params.scale``. Tides
     are wider: only the other parts are meant.
     """
-    return float(np.hypot(*flow)) * min(float(np.hypot(*ground)) * dt / params.scale, 1.0)
+    return math.hypot(*flow) * min(math.hypot(*ground) * dt / params.scale, 1.0)
 
 
 def _squared(a: Complex, t: float) -> Array:
@@ -214,12 +226,11 @@ def _wandered(a: Complex, t: float, square: Array, linear: Complex) -> tuple[Com
     return cross, own
 
 
-def _put(matrix: Array, values: Any, rows: Any, columns: Any) -> None:
-    """Add complex factors as real blocks of two by two at pairs of places."""
-    blocks = matrix.reshape(len(matrix) // 2, 2, -1, 2)
-    values, real = np.asarray(values), np.real(values)
-    blocks[rows, 0, columns, 0] += real
-    blocks[rows, 1, columns, 1] += real
-    if np.iscomplexobj(values):
-        blocks[rows, 1, columns, 0] += values.imag
-        blocks[rows, 0, columns, 1] -= values.imag
+def _real(parts: Complex) -> Array:
+    """Complex factors ((..., k, k)) as real blocks of two by two ((..., 2 k, 2 k))."""
+    *some, k, _ = parts.shape
+    out = np.empty((*some, k, 2, k, 2))
+    out[..., 0, :, 0] = out[..., 1, :, 1] = parts.real
+    out[..., 1, :, 0] = parts.imag
+    out[..., 0, :, 1] = -parts.imag
+    return out.reshape(*some, 2 * k, 2 * k)

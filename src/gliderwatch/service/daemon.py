@@ -72,7 +72,7 @@ class OverdueTimer:
             if is_busy(glider) or hold > 0:
                 continue
             alerts += transaction.tick(self._store, glider, routing, _others(gliders, glider, routing), now)
-            at = transaction.next_tick(self._store, glider, routing, now)
+            at = transaction.next_tick(self._store, glider, routing, now, now + TICK)
             if at is not None and at > now:
                 pause = min(pause, at - now)
         return tuple(alerts), min(pause, hold) if hold > 0 else pause

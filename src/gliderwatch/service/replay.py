@@ -374,7 +374,7 @@ def _due(glider: str, report: Report, routing: Routing, until: float) -> float |
     now, coming = report.clock[glider], report.coming[glider]
     if not coming or coming[0] - now >= GONE:
         return None
-    at = transaction.next_tick(report.store, glider, routing, now)
+    at = transaction.next_tick(report.store, glider, routing, now, until)
     return at if at is not None and now < at <= until else None
 
 

@@ -178,7 +178,7 @@ def notify_pilots(
 def tick(store: Store, glider: str, routing: Routing, others: Iterable[str], now: float) -> tuple[Alert, ...]:
     """Report that a glider is overdue, if it is at `now` (s), and changes of incidents that have waited
     until then; `others` are watched as well."""
-    due_at = next_tick(store, glider, routing, now)
+    due_at = next_tick(store, glider, routing, now, now)
     if due_at is None or due_at > now:
         return ()
     with store.transaction():
@@ -233,13 +233,13 @@ def _channels(
     return channels
 
 
-def next_tick(store: Store, glider: str, routing: Routing, now: float) -> float | None:
-    """When `tick` makes a message about a glider next (s), None: never."""
+def next_tick(store: Store, glider: str, routing: Routing, now: float, until: float = inf) -> float | None:
+    """When `tick` makes a message about a glider next (s), None: never, or only after `until` (s)."""
     attention = with_mute(routing.attention(glider), store.notes.muted_until(glider))
     if attention.recovered:
         return None
     notified, facts, hours = store.notified(glider), store.facts(glider), attention.overdue_hours
-    at = overdue.next_tick(notified.silences, facts, hours, now, _back(store, notified.silences))
+    at = overdue.next_tick(notified.silences, facts, hours, now, _back(store, notified.silences), until)
     if notified.settles is not None:
         at = notified.settles if at is None else min(at, notified.settles)
     return at if at is None or attention.muted_until is None else max(at, attention.muted_until)

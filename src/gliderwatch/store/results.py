@@ -8,7 +8,7 @@ from pathlib import Path
 
 from gliderwatch.incidents.acknowledgement import Ack, Acks
 from gliderwatch.incidents.calls import announced_flight
-from gliderwatch.incidents.constants import GONE, UNTIL_COME
+from gliderwatch.incidents.constants import FRESH, GONE, UNTIL_COME
 from gliderwatch.incidents.irregularities import PLACES, Arrival, irregularities
 from gliderwatch.incidents.notices import Irregularity, Unjudged
 from gliderwatch.incidents.overdue import Sign
@@ -219,7 +219,16 @@ class GliderFacts:
     def irregularities(self, now: float) -> list[Irregularity]:
         """What is wrong with its files, as known at `now` (s)."""
         steps = segments.steps(self._db, self.glider)
-        return irregularities(self.glider, steps, self.places(PLACES), self.arrivals(now - GONE, now))
+        arrivals = self.arrivals(now - GONE, now) if self._came_late(now - GONE, now) else []
+        return irregularities(self.glider, steps, self.places(PLACES), arrivals)
+
+    def _came_late(self, since: float, until: float) -> bool:
+        """Whether any file came days after its date, between two times (s): hardly ever."""
+        sql = (
+            "SELECT EXISTS (SELECT 1 FROM heard WHERE glider = ? AND at BETWEEN ? AND ? "
+            "AND at - coalesce(last_t, opened_at) >= ?)"
+        )
+        return bool(self._db.execute(sql, (self.glider, since, until, FRESH)).fetchone()[0])
 
     def places(self, n: int) -> list[Fix]:
         """Where and when it surfaced the last `n` times that are known, in order of time."""
