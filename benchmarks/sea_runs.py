@@ -269,11 +269,11 @@ def fed(store: Store, flown: Flight, params: GliderParams) -> Iterator[tuple[flo
     """Each message with the time (s) at which it could be told, in order; silences come between files."""
     glider, clock = flown.segments[0].id.glider, flown.on_shore[0]
     for segment, at in zip(flown.segments, flown.on_shore, strict=True):
-        tick = transaction.next_tick(store, glider, NOBODY, clock)
+        tick = transaction.next_tick(store, glider, NOBODY, clock, at)
         while tick is not None and clock < tick <= at:
             for alert in transaction.tick(store, glider, NOBODY, (), tick):
                 yield tick, alert
-            clock, tick = tick, transaction.next_tick(store, glider, NOBODY, tick)
+            clock, tick = tick, transaction.next_tick(store, glider, NOBODY, tick, at)
         clock = at
         file = File(segment.id.name, 0, 0, Status.WAITING, glider, segment.id.name)
         for alert in transaction.process_file(store, file, segment, params, NOBODY, at).alerts:

@@ -244,7 +244,7 @@ class Renamed:
 
 
 def compare(a: Path, b: Path, renamed: Renamed, without: tuple[str, ...], within: float = 0.0) -> int:
-    """Print what differs between two folders by more than `within` (part of a number); how many missions do."""
+    """Print what differs between two folders by more than `within` (part of a number); how many do."""
     names = sorted({path.name for folder in (a, b) for path in folder.glob("*.jsonl")})
     if not names:
         raise SystemExit(f"nothing to compare in {a} and {b}")

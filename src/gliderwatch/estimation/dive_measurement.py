@@ -41,6 +41,7 @@ from gliderwatch.estimation.constants import (
 from gliderwatch.estimation.kinematic_speed import KinematicSpeed
 from gliderwatch.model import Array, Dive, Fix, readonly
 from gliderwatch.navigation.geodesy import displacement
+from gliderwatch.navigation.track import flown as flying_in
 
 # ----------------------------------------
 # What one dive measures of speed and flow, and how well. Pure.
@@ -115,7 +116,7 @@ def observe(dive: Dive) -> Observation:
     track = dive.track
     dt = np.diff(track.t)
     interval = float(dt.sum())
-    flying = np.any(track.heading != 0, axis=1)
+    flying = flying_in(track)
     late = _not_logged(dive, dt[flying])
     share = dt[flying] / interval * (1 + late / max(float(dt[flying].sum()), 1.0))
     flown, vectors = float(share.sum()), track.heading[flying]

@@ -127,6 +127,10 @@ class JointParams:
     front: float = FRONT
     alarms_per_month: float = 0.05
 
+    def __hash__(self) -> int:
+        """Of some of the numbers: it is asked for several times a dive, and parameters are few."""
+        return hash((self.speed, self.slip, self.front, self.alarms_per_month))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointState:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gliderwatch.model import Array, Current, Fix, Series, Track, readonly
 from gliderwatch.navigation.constants import (
@@ -110,7 +111,12 @@ def mean_heading(track: Track) -> tuple[Array, float]:
     """Mean over the whole interval of the heading vector (zero at the surface), and seconds flown."""
     dt = np.diff(track.t)
     mean = (track.heading * dt[:, None]).sum(axis=0) / (track.t[-1] - track.t[0])
-    return mean, float(dt[np.any(track.heading != 0, axis=1)].sum())
+    return mean, float(dt[flown(track)].sum())
+
+
+def flown(track: Track) -> NDArray[np.bool_]:
+    """Which intervals of a track have a heading, (n - 1,): at the surface there is none."""
+    return np.asarray((track.heading[:, 0] != 0) | (track.heading[:, 1] != 0))
 
 
 class Closure(NamedTuple):
@@ -129,14 +135,14 @@ class Closure(NamedTuple):
 
 def closure(track: Track, current: Current) -> Closure | None:
     """The closure test of a dive; None where the glider circled."""
-    mean, flown = mean_heading(track)
+    mean, seconds = mean_heading(track)
     length = float(np.hypot(*mean))
     interval = float(track.t[-1] - track.t[0])
-    if length * interval < CIRCLING * max(flown, 1.0):
+    if length * interval < CIRCLING * max(seconds, 1.0):
         return None
     rest = track.x[-1] / interval - np.array([current.u, current.v])
     along = float(rest @ mean) / length**2
-    headings = track.heading[np.any(track.heading != 0, axis=1)]
+    headings = track.heading[flown(track)]
     aside = (mean[0] * headings[:, 1] - mean[1] * headings[:, 0]) / length
     return Closure(
         along_speed=along,

@@ -92,6 +92,10 @@ class FlowParams:
     tide_least: float = TIDE_LEAST
     scale: float = CURRENT_SCALE
 
+    def __hash__(self) -> int:
+        """Of some of the numbers: it is asked for several times a dive, and parameters are few."""
+        return hash((self.lasting, self.passing, self.scale))
+
     @property
     def parts(self) -> int:
         """How many parts the flow has."""
