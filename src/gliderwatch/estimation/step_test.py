@@ -149,7 +149,7 @@ def likeliest(bank: Bank, which: int, sign: int = 0) -> Step | None:
 @lru_cache(maxsize=2)  # asked for a loss and for a turn
 def _sizes(bank: Bank) -> tuple[Array, Array]:
     """The likeliest value of each number under each hypothesis, and its variance: (k, q) each."""
-    cov: Array = np.linalg.inv(bank.info)
+    cov = np.asarray(np.linalg.inv(bank.info), dtype=np.float64)
     return (cov @ bank.score[:, :, None])[:, :, 0], cov.diagonal(axis1=1, axis2=2)
 
 
