@@ -237,15 +237,16 @@ def called(state: Surfacings, fix: Fix, waypoint: Place | None) -> Surfacings:
 
 def _timed(state: Surfacings, dive: Dive, end: Fix) -> Surfacings:
     """The state with the times of a dive."""
-    known = replace(state, duration=dive.t_surface - dive.t_dive)
+    duration = dive.t_surface - dive.t_dive
     if state.fix is None or is_unseen(dive):
-        return known
+        return replace(state, duration=duration)
     interval = max(end.t - state.fix.t, 1.0)
     errors = state.errors
     if state.intervals:
         errors = (*errors, timing.error(interval, timing.usual(state.intervals)))
     return replace(
-        known,
+        state,
+        duration=duration,
         intervals=(*state.intervals, interval)[-INTERVALS_KEPT:],
         errors=errors[-MISSES_KEPT:],
         surface=(*state.surface, max(dive.t_dive - state.fix.t, 0.0))[-HABIT_DIVES:],
@@ -322,12 +323,12 @@ def _driven(state: Surfacings, dive: Dive) -> Surfacings:
     if state.current is not None:
         square = math.dist(current, state.current) ** 2 / 2
         change = DIVE_MEMORY * change + (1 - DIVE_MEMORY) * min(square, WILD_CHANGE * change)
-    state = replace(state, current=current, change=change)
     over_ground, heading = ground(dive), np.array(state.heading or (0.0, 0.0))
-    if dive.track is None or over_ground is None or np.hypot(*heading) < STEADY_HEADING:
-        return state
-    own = float((over_ground - current) @ heading / (heading @ heading))
-    return replace(state, speed=min(max(own, SLOWEST), FASTEST))
+    speed = state.speed
+    if dive.track is not None and over_ground is not None and np.hypot(*heading) >= STEADY_HEADING:
+        own = float((over_ground - current) @ heading / (heading @ heading))
+        speed = min(max(own, SLOWEST), FASTEST)
+    return replace(state, current=current, change=change, speed=speed)
 
 
 # ----------------------------------------

@@ -61,6 +61,11 @@ class History:
             self._joined[name] = found
         return found
 
+    def is_later(self, name: str) -> bool:
+        """Whether all fresh readings of a quantity are later than those before, as nearly always."""
+        since = self.fresh_from(name)
+        return all(one[name].t[-1] < since for one in self.before if name in one)
+
     def fresh_from(self, name: str) -> float:
         """The time (s) of the first fresh reading of a quantity; infinite where there is none."""
         series = self.fresh.get(name, EMPTY)

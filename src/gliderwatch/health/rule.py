@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gliderwatch.health.constants import CLEAR_AFTER, ROBUST, SHOWN
 from gliderwatch.health.readings import History
-from gliderwatch.model import Array, Series, Severity
+from gliderwatch.model import EMPTY, Array, Series, Severity
 
 Limits = Mapping[str, float | None]
 """The limits of a rule by name (SI), as configured; None: that one is not looked at."""
@@ -80,6 +80,9 @@ def run(
 ) -> Series | None:
     """The last `n` or more readings in a row that are bad, of which at least one is fresh; None: there are
     no such."""
+    fresh = history.fresh.get(name, EMPTY)
+    if not is_bad(fresh.v).any() and history.is_later(name):
+        return None  # those before need not be joined
     series, since = history.get(name), history.fresh_from(name)
     if len(series) < n:
         return None

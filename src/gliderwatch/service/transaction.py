@@ -383,9 +383,11 @@ def _currents(store: Store, glider: str, notified: NotificationState) -> list[Di
     last, before = store.facts(glider).last_surfacing(inf), notified.neighbours
     if last is None or (before is not None and before.checked >= last.t_surface):
         return None
-    currents = list[DiveCurrent]()
-    for other in store.gliders():
-        dives = store.surfaced_between(other, last.t_surface - CHECK_WINDOW, last.t_surface)
+    currents, since = list[DiveCurrent](), last.t_surface - CHECK_WINDOW
+    found = {each: store.surfaced_between(each, since, last.t_surface) for each in store.gliders()}
+    if not any(dives for other, dives in found.items() if other != glider):
+        return []  # a glider alone is compared with nothing
+    for dives in found.values():
         each = map(current_of, dives, [None, *dives])
         currents += [current for current in each if current is not None]
     return currents
