@@ -257,7 +257,7 @@ def step(
     known = normal
     state, flag, reason, normal = _regime(state, dive, info, kinematic, normal, flag, reason, params)
     before = known.usual if reason.startswith(NEW_WAY) else None
-    if flag is Flag.NORMAL and not frozen:
+    if flag is Flag.NORMAL and not frozen and not state.other:
         state = replace(_learnt(state, dive, info, at, params), trim=_trim(dive))
     return state, Verdict(flag, reason, normal, info, before=before)
 
@@ -276,17 +276,26 @@ def _regime(
 
     A faster glider is no fault: three dives at one speed, which depth rate and pitch do not deny, are a new
     way of flying with a range of its own. A slower one is that only where the pilot changed pitch or ballast.
+    Where the way between the fixes hardly shows the speed, depth rate and pitch show it alone.
     """
     speed, learning = info.estimate.speed, params.learning
     faster = reason == FASTER
+    if flag is Flag.FALSE_ALARM and not faster:
+        return state, flag, reason, normal  # it says nothing of the way of flying
+    is_vague = info.estimate.own_sigma > OWN_SURE * normal.usual or (flag is None and reason == NOT_SEEN)
+    if is_vague and not faster and kinematic is not None and kinematic.is_prompt:
+        speed = kinematic.speed * (1 - _usual_slip(params))
     explained = speed > EXPLAINED * normal.usual and retrimmed(state.trim, _trim(dive))
-    slower = flag is Flag.ANOMALY and explained and kinematic is not None and info.kinematic_fits
+    is_slow = flag is Flag.ANOMALY or (is_vague and speed < normal.low)
+    slower = is_slow and explained and kinematic is not None and info.kinematic_fits
     if learning is None or not normal.dives or not (faster or slower):
         return (replace(state, other=()) if state.other else state), flag, reason, normal
     if faster and kinematic is not None and not info.kinematic_fits:
         return replace(state, other=()), flag, reason, normal
     row = (*(each for each in state.other if abs(each / speed - 1) < AGREE), speed)
     if len(row) < ENOUGH:
+        if flag is Flag.NORMAL:
+            return replace(state, other=row), flag, reason, normal
         return replace(state, other=row), None, NEW_FASTER if faster else NEW_SLOWER, normal
     at = setting(dive.features)
     state = replace(state, normal=renewed(state.normal, row, at), other=(), slow=0.0, doubted=0)

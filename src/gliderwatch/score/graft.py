@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
+from math import inf
 
 import numpy as np
 
@@ -72,11 +73,14 @@ def own_speeds(dives: Sequence[Dive]) -> dict[float, float]:
     return found
 
 
-def grafted(segments: Sequence[Segment], graft: Graft, onset: float, usual: float) -> list[Segment]:
-    """The segments with a fault since ``onset`` (s); ``usual`` (m/s) is the speed of dives that tell none."""
+def grafted(
+    segments: Sequence[Segment], graft: Graft, onset: float, usual: float, end: float = inf
+) -> list[Segment]:
+    """The segments with a fault since ``onset`` (s), where the glider is slowed until ``end`` (s); ``usual`` (m/s)
+    is the speed of dives that tell none."""
     dives = [dive for dive in navigate(segments) if dive.track is not None]
     change = (
-        _slowed(dives, graft.size, onset, usual)
+        _slowed(dives, graft.size, (onset, end), usual)
         if graft.kind is GraftKind.SLOWED
         else _wrong(dives, graft.size, onset)
     )
@@ -90,16 +94,17 @@ def grafted(segments: Sequence[Segment], graft: Graft, onset: float, usual: floa
 _Change = Callable[[Segment, float], Mapping[str, Series]]
 
 
-def _slowed(dives: Sequence[Dive], size: float, onset: float, usual: float) -> _Change:
+def _slowed(dives: Sequence[Dive], size: float, during: tuple[float, float], usual: float) -> _Change:
     """Takes a part of the way through the water out of all positions, and of speeds and depths."""
-    t, lost = lost_way(dives, size, onset, usual)
+    onset, end = during
+    t, lost = lost_way(dives, size, onset, usual, end)
 
     def change(segment: Segment, _: float) -> Mapping[str, Series]:
         out = dict(segment.quantities)
         for name in (n for n in _SLOWED if n in out):
             at, v = out[name].t, out[name].v
             kept = np.minimum(v, _SURFACE) if name == "depth" else 0.0
-            out[name] = Series(at, readonly(np.where(at < onset, v, kept + (1.0 - size) * (v - kept))))
+            out[name] = Series(at, readonly(np.where((at < onset) | (at >= end), v, kept + (1.0 - size) * (v - kept))))
         for name in _POSITIONS:
             lat, lon = segment.get(f"{name}_lat"), segment.get(f"{name}_lon")
             if len(lat) and len(lat) == len(lon):
@@ -110,17 +115,19 @@ def _slowed(dives: Sequence[Dive], size: float, onset: float, usual: float) -> _
     return change
 
 
-def lost_way(dives: Sequence[Dive], size: float, onset: float, usual: float) -> tuple[Array, Array]:
+def lost_way(
+    dives: Sequence[Dive], size: float, onset: float, usual: float, end: float = inf
+) -> tuple[Array, Array]:
     """Times (s) and the way (m: east, north) lost until then: part ``size`` of speed times heading."""
     speeds, times, steps = own_speeds(dives), [onset - 1.0], [np.zeros(2)]
     for dive in dives:
         assert dive.track is not None
         speed = speeds.get(dive.t_dive, usual)
         for (a, b), heading in zip(pairwise(dive.track.t.tolist()), dive.track.heading, strict=True):
-            begin = max(a, onset)
-            if b > begin:
-                times += [begin, b]
-                steps += [np.zeros(2), size * speed * (b - begin) * heading]
+            begin, until = max(a, onset), min(b, end)
+            if until > begin:
+                times += [begin, until]
+                steps += [np.zeros(2), size * speed * (until - begin) * heading]
     return np.array(times), np.cumsum(steps, axis=0)
 
 
