@@ -272,3 +272,20 @@ def test_a_replay_says_what_was_said_live(copied, spoil: Callable[[Path], None])
 def test_a_missing_cache_says_where_it_was_looked_for() -> None:
     assert str(MissingCache("ab", ["/a", "/b"])) == "cache file ab.cac is missing: not in /a, /b"
     assert not isinstance(MissingCache("ab"), Quarantine)
+
+
+def test_gps_that_is_gone_is_spoken_of_though_depth_rate_and_pitch_look_as_usual(mission):
+    live, gone = Live(()), mission[1][HEALTHY][1].id.opened_at
+    for path, segment in mission[1][: HEALTHY + 24]:
+        if segment.id.opened_at >= gone:
+            kept = {name: v for name, v in segment.quantities.items() if not name.startswith("fix_")}
+            segment = replace(segment, quantities=kept)  # noqa: PLW2901
+        file = File(str(path), 1, 1, Status.WAITING, "angus", segment.id.name)
+        taken = transaction.process_file(
+            live.store, file, segment, GliderParams(), live.speaking, segment.last_t
+        )
+        live.alerts += taken.alerts
+    (first, *_) = live.unknown
+    assert first.title == "angus CANNOT BE JUDGED for 26.9 h: no fix"
+    assert "no fix; as fast as usual by depth rate and pitch alone" in first.body
+    assert {a.kind for a in live.alerts} <= {Kind.UNKNOWN, Kind.REMINDER}

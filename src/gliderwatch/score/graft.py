@@ -76,8 +76,8 @@ def own_speeds(dives: Sequence[Dive]) -> dict[float, float]:
 def grafted(
     segments: Sequence[Segment], graft: Graft, onset: float, usual: float, end: float = inf
 ) -> list[Segment]:
-    """The segments with a fault since ``onset`` (s), where the glider is slowed until ``end`` (s); ``usual`` (m/s)
-    is the speed of dives that tell none."""
+    """The segments with a fault since ``onset`` (s); one that slows the glider ends at ``end`` (s). ``usual``
+    (m/s) is the speed of dives that tell none."""
     dives = [dive for dive in navigate(segments) if dive.track is not None]
     change = (
         _slowed(dives, graft.size, (onset, end), usual)
@@ -104,7 +104,9 @@ def _slowed(dives: Sequence[Dive], size: float, during: tuple[float, float], usu
         for name in (n for n in _SLOWED if n in out):
             at, v = out[name].t, out[name].v
             kept = np.minimum(v, _SURFACE) if name == "depth" else 0.0
-            out[name] = Series(at, readonly(np.where((at < onset) | (at >= end), v, kept + (1.0 - size) * (v - kept))))
+            out[name] = Series(
+                at, readonly(np.where((at < onset) | (at >= end), v, kept + (1.0 - size) * (v - kept)))
+            )
         for name in _POSITIONS:
             lat, lon = segment.get(f"{name}_lat"), segment.get(f"{name}_lon")
             if len(lat) and len(lat) == len(lon):

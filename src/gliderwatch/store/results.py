@@ -186,12 +186,21 @@ class GliderFacts:
 
     def unjudged(self, since: float) -> tuple[Unjudged, ...]:
         """Dives without a flag, and files that were not taken, that began later than `since` (s)."""
-        sql = (
-            "SELECT data FROM assessments WHERE glider = ? AND t_dive > ? AND flag IS NULL "
-            "AND (ended = 1 OR json_extract(data, '$.n_samples') > 2)"
-        )
+        sql = "SELECT data FROM assessments WHERE glider = ? AND t_dive > ? AND flag IS NULL AND ended = 1"
         dives = values(self._db, sql, (self.glider, since), Assessment)
-        return (*map(_of_dive, dives), *self._not_taken(since), *self._empty(since))
+        return (*map(_of_dive, dives), *self._no_fix(since), *self._not_taken(since), *self._empty(since))
+
+    def _no_fix(self, since: float) -> Iterator[Unjudged]:
+        """The dive since the last fix, however it looks by depth rate and pitch, up to the last file."""
+        sql = (
+            "SELECT data, ended, (SELECT max(last_t) FROM heard WHERE glider = ?1) FROM assessments "
+            "WHERE glider = ?1 AND t_dive > ?2 ORDER BY t_dive DESC LIMIT 1"
+        )
+        for data, ended, last in self._db.execute(sql, (self.glider, since)):
+            dive = codec.plain_decode(data, Assessment)
+            if not ended and dive.n_samples > 2:  # fewer: a time without files
+                words = "no fix" if dive.flag is None else f"no fix; {dive.reason.partition(' (')[0]}"
+                yield Unjudged(dive.t_dive, max(dive.t_surface, last or 0.0), dive.unusable, words)
 
     def _not_taken(self, since: float) -> Iterator[Unjudged]:
         """Segments of which a file came, but none that could be taken."""
