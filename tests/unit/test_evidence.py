@@ -155,3 +155,11 @@ def test_a_misfit_counts_beyond_four_standard_errors(misfit: float, sigma: float
 def test_not_a_number_is_left_out() -> None:
     evidence = dict.fromkeys(after(), float("nan"))
     assert usual(evidence) == []
+
+
+@pytest.mark.parametrize(("own", "is_out"), [(0.24, True), (0.25, False)])
+def test_what_a_glider_believes_is_compared_less_the_slip(own: float, is_out: bool) -> None:
+    """The normal range is of the speed through the water: 0.24 m/s of its own are 0.22, below 0.225."""
+    dive = replace(SLOW, speed_min=0.225, evidence={"onboard_speed": own})
+    pro, con = weigh(dive, Kind.ANOMALY, DRAG)
+    assert any("out of the normal range" in line for line in (*pro, *con)) is is_out

@@ -96,7 +96,7 @@ class TestOpened:
 
     def test_evidence_is_weighed(self) -> None:
         pro = section(opened().body, "For: a lost or bent wing")
-        assert "0.12 m/s along the heading, out of the normal range" in pro[0]
+        assert "0.11 m/s through the water, out of the normal range" in pro[0]
         assert "mean roll 18 degrees" in pro
         assert "magnetic declination from WMM2025" in section(opened().body, "Data")
 
@@ -185,7 +185,7 @@ class TestFalseAlarm:
         assert "across the heading the track misses by 0.31 m/s" in pro
         assert "are 0.58 m/s apart" in pro
         # a speed that needs the current is no evidence where the current is in doubt
-        assert "along the heading" not in body
+        assert "less current gives" not in body
 
 
 class TestThread:

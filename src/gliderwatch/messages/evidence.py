@@ -23,6 +23,7 @@ UNOBSERVED = 0.1  # h
 SURE = 4.0  # standard errors beyond which a misfit is one
 STRONG, MINOR = 3.0, 0.5  # weights of what decides, and of what is good to know; others: 1
 LINES = 3  # on each side, for a phone
+USUAL_SLIP = 0.08  # part of the speed that a glider reckons with, which the angle of attack takes
 LEARNT = 1.6  # times the usual speed: a bound above it was not learnt from dives
 CERTAIN = 0.99  # more than that is never claimed: what is modelled is not all
 _WORDS = ((0.975, "almost sure"), (0.9, "very likely"), (0.75, "likely"), (0.0, "not sure"))
@@ -135,11 +136,11 @@ def _speeds(a: Assessment, cause: Cause) -> list[Remark]:
     across = number(a, "across_misfit")
     rows = []
     if across is None or abs(across) <= misfit_limit(a):
-        rows.append(("along_speed", "ground velocity less current gives {} along the heading"))
-    rows.append(("onboard_speed", "the glider itself reports {}"))
+        rows.append(("along_speed", "ground velocity less current gives {} through the water"))
+    rows.append(("onboard_speed", "the glider itself reports {} through the water"))
     found = []
     for name, words in rows:
-        value = number(a, name)
+        value = through_water(number(a, name))
         if value is not None:
             is_out = out_of_range(a, value)
             text = f"{words.format(speed(value))}, {'out of' if is_out else 'within'} the normal range"
@@ -185,11 +186,21 @@ def _disagreement(a: Assessment) -> list[Remark]:
         found.append(
             Remark(not agree, f"{text}, within their errors" if agree else text, MINOR if agree else 2.0)
         )
-    onboard = number(a, "onboard_speed")
+    onboard = through_water(number(a, "onboard_speed"))
     if onboard is not None and not out_of_range(a, onboard):
-        text = f"the glider itself reports {speed(onboard)}, within the normal range"
+        text = f"the glider itself reports {speed(onboard)} through the water, within the normal range"
         found.append(Remark(True, text, MINOR))
     return found
+
+
+def through_water(own: float | None) -> float | None:
+    """The speed through the water (m/s) of a healthy glider that reckons with its ``own`` one: less what the
+    angle of attack takes. The normal range is of that speed.
+
+    >>> round(through_water(0.25), 3)
+    0.23
+    """
+    return None if own is None else own * (1 - USUAL_SLIP)
 
 
 def misfit_limit(a: Assessment) -> float:
