@@ -48,6 +48,10 @@ class Vitals:
     def growth(self) -> list[str]:
         """What the last daemon has more than it began with."""
         pss, files, found = self.pss, self.open_files, []
+        if "young" not in pss:
+            return [
+                "the last daemon was not measured when it began: the machine is too busy for so few minutes"
+            ]
         if len(files["end"]) > len(files["young"]) + _FILES:
             more = Counter(files["end"]) - Counter(files["young"])
             found.append(f"open files that were not before: {dict(more)}")

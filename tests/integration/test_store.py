@@ -502,7 +502,9 @@ class TestSurfacings:
     def expect(self, store: Store, after: float, opened_at: float) -> NextSurfacing:
         made = NextSurfacing(after, after + 100.0, opened_at, 30.0, -80.0, 1.0, 0.0, 1.0, "as before")
         state = GliderState(memory=Memory(expected=made))
-        store.segments.checkpoint(SegmentId(opened_at, "electa", f"electa-{opened_at:g}"), state)
+        store.segments.checkpoint(
+            SegmentId(opened_at, "electa", f"electa-{opened_at:g}"), state, state.memory.expected
+        )
         return made
 
     def test_the_last_expected_as_known_at_a_time(self, store):
@@ -517,7 +519,7 @@ class TestSurfacings:
         self.expect(store, 200.0, 110.0)
         moved = self.expect(store, 190.0, 110.0)
         assert store.facts("electa").expected(1e9) == moved
-        store.segments.checkpoint(SegmentId(110.0, "electa", "electa-110"), GliderState())
+        store.segments.checkpoint(SegmentId(110.0, "electa", "electa-110"), GliderState(), None)
         assert store.facts("electa").expected(1e9) == first
 
     def test_a_segment_is_heard_once_and_read_later(self, store):

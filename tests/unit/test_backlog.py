@@ -6,7 +6,7 @@ import pytest
 
 from gliderwatch.errors import Quarantine
 from gliderwatch.model import SegmentId
-from gliderwatch.service.backlog import AHEAD, Backlog, Job
+from gliderwatch.service.backlog import AHEAD, FEWEST, HELD, RUN, Backlog, Job
 from gliderwatch.slocum.header import Header
 from gliderwatch.store.state_file import File, Status
 
@@ -32,13 +32,57 @@ def test_files_of_a_glider_are_decoded_oldest_first() -> None:
     assert [j.header.id.opened_at for j in started(backlog, 9)] == [1.0, 2.0, 3.0]
 
 
-def test_gliders_take_turns() -> None:
+def test_gliders_take_turns_by_runs_and_one_that_had_none_at_hand_is_next() -> None:
     backlog = Backlog()
     for glider in ("a", "b"):
-        for opened_at in (1.0, 2.0, 3.0):
+        for opened_at in range(RUN + 2):
             backlog.add(job(glider, opened_at))
+    begun = started(backlog, 3)
     backlog.add(job("c", 9.0))
-    assert [j.header.id.glider for j in started(backlog, 9)] == ["a", "b", "c", "a", "b", "a", "b"]
+    begun += started(backlog, 2 * RUN)
+    turns = "".join(j.header.id.glider for j in begun)
+    assert turns == "aba" + "c" + "a" * (RUN - 2) + "b" * (RUN - 1) + "aa"
+
+
+def test_a_run_waits_for_its_files_and_is_taken_by_none_else() -> None:
+    backlog = Backlog()
+    for opened_at in range(RUN + 1):
+        backlog.add(job("a", opened_at))
+    begun = started(backlog, RUN + 1)
+    for one in begun[: RUN - 1]:
+        backlog.finish(one, DONE)
+    assert backlog.ready("a") == []
+    backlog.finish(begun[RUN - 1], DONE)
+    assert backlog.ready("a") == begun[:RUN]
+    backlog.begin_run("a", RUN)
+    backlog.finish(begun[RUN], DONE)
+    assert backlog.ready("a") == [] and backlog.decoded("a") is None
+    assert backlog.end_run("a") == begun[:RUN]
+    assert [backlog.decoded("a") for _ in begun] == begun
+
+
+def test_few_files_do_not_wait_for_each_other() -> None:
+    backlog = Backlog()
+    for opened_at in range(FEWEST - 1):
+        backlog.add(job("a", opened_at))
+    first, *_ = started(backlog, 9)
+    backlog.finish(first, DONE)
+    assert backlog.ready("a") == [first]
+
+
+def test_what_is_decoded_at_once_has_its_bounds_but_for_newcomers() -> None:
+    """And then no run waits for more files, which do not come."""
+    backlog = Backlog()
+    for n in range(HELD):
+        for opened_at in range(FEWEST):
+            backlog.add(job(f"g{n}", opened_at))
+    begun = started(backlog, HELD)
+    assert len(begun) == HELD and backlog.is_full and backlog.next() is None
+    backlog.finish(begun[0], DONE)
+    assert backlog.ready("g0") == [begun[0]]
+    backlog.add(job("new", 1.0))
+    newcomer = backlog.next()
+    assert newcomer is not None and newcomer.header.id.glider == "new" and backlog.next() is None
 
 
 def test_a_file_is_taken_after_those_before_it() -> None:
@@ -134,5 +178,5 @@ def test_a_glider_that_had_nothing_at_hand_is_next():
     assert [j.header.id.glider for j in started(backlog, 4)] == ["a", "b", "c", "a"]
     backlog.add(job("d", 9.0))
     backlog.add(job("d", 10.0))
-    assert [j.header.id.glider for j in started(backlog, 4)] == ["d", "b", "c", "a"]
+    assert [j.header.id.glider for j in started(backlog, 4)] == ["d", "a", "b", "b"]
     assert (backlog.behind("d"), backlog.behind("a"), backlog.behind("e")) == (2, 3, 0)

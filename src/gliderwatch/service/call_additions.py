@@ -60,6 +60,7 @@ def keep_call(store: Store, file: File, dialog: Dialog, now: float) -> None:
     segment = None if at is None else store.segments.get(at)
     before = None if segment is None else added(store, segment)
     store.calls.keep(file.path, call, plain_encode(dialog), now)
+    store.segments.changed(call.glider)  # also segments that are still to come may get something from it
     if at is not None and segment is not None and added(store, segment) != before:
         store.segments.outdate(at)
 

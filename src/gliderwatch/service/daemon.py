@@ -26,7 +26,7 @@ from gliderwatch.service.page_writer import PagesWritten, PageWriter
 from gliderwatch.service.relays import BatchesCame
 from gliderwatch.service.routing import Routing
 from gliderwatch.service.run import StoppedError
-from gliderwatch.service.runtime import Decoded, News, Runtime, build
+from gliderwatch.service.runtime import Decoded, News, Ran, Runtime, build
 from gliderwatch.service.state_outage import StateOutage
 from gliderwatch.service.virtual_ais import VirtualAis
 from gliderwatch.slocum.watch import CacheChanged, EventsLost, FileChanged, ScienceChanged
@@ -267,6 +267,8 @@ class Daemon:
             return
         if isinstance(news, Decoded):
             self._intake.decoded(news)
+        elif isinstance(news, Ran):
+            self._intake.ran(news)
         elif isinstance(news, FileChanged | ScienceChanged):
             self._intake.observe(news.path)
         elif isinstance(news, CacheChanged):
@@ -337,7 +339,7 @@ class Daemon:
         if self._caught_up:
             self._intake.notify_unmuted(time.time())
         at_hand = self._intake.at_hand
-        is_well = self._upkeep.is_well(self._runtime.dispatcher, backlog.decoding)
+        is_well = self._upkeep.is_well(self._runtime.dispatcher, backlog.decoding + backlog.running)
         self._intake.send(self._upkeep.beat(is_well, at_hand))
         if not is_well:
             return

@@ -179,10 +179,10 @@ class Upkeep:
             self._metrics.assess.observe(seconds)
             self._decoding.done(time.monotonic())  # what was decoded meanwhile had to wait for this loop
 
-    def is_well(self, dispatcher: Dispatcher, decoding: int) -> bool:
-        """Whether dispatcher and decoder, with so many files in work, make progress, as this loop does."""
+    def is_well(self, dispatcher: Dispatcher, in_work: int) -> bool:
+        """Whether dispatcher and workers, with so much in work, make progress, as this loop does."""
         now = time.monotonic()
-        self._decoding.look(decoding, now)
+        self._decoding.look(in_work, now)
         late, decoder_late = now - dispatcher.progress(), self._decoding.late(now)
         is_stuck = not dispatcher.alive() or late > STALLED
         if is_stuck:

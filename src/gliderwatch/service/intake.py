@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,7 +22,9 @@ from gliderwatch.service.backlog import Job
 from gliderwatch.service.heartbeat import Upkeep
 from gliderwatch.service.layers import layers_of
 from gliderwatch.service.routing import Routing
-from gliderwatch.service.runtime import Decoded, Runtime
+from gliderwatch.service.run import Processed, Run
+from gliderwatch.service.run_workers import why_not
+from gliderwatch.service.runtime import Decoded, Ran, Runtime
 from gliderwatch.slocum import folders
 from gliderwatch.slocum.folders import flight_files
 from gliderwatch.slocum.mission_arguments import write_goto, write_yo
@@ -204,17 +206,127 @@ class Intake:
             return  # of before the configuration was read again: the scan has found it again
         self._upkeep.decoded(news.job)
         backlog.finish(news.job, news.outcome)
-        while (job := backlog.decoded(news.job.header.id.glider)) is not None:
-            try:
-                self._finish(job)
-            except StateError:
-                self._settle_again(Path(job.file.path))
-                raise
+        self._go_on(news.job.header.id.glider)
         self._runtime.feed()
+
+    def _go_on(self, glider: str) -> None:
+        """Take the next files of a glider that are decoded: many in a run, by a worker, else each at once."""
+        backlog = self._runtime.backlog
+        while jobs := backlog.ready(glider):
+            try:
+                run = self._run(jobs)
+            except StateError:
+                self._let_go(jobs)
+                raise
+            if run is not None:
+                left = backlog.behind(glider)
+                kept = [
+                    self._store.segments.is_kept(one.name, left - n)
+                    for n, one in enumerate(run.plan.segments, 1)
+                ]
+                self._runtime.process(glider, run, kept)
+                return
+            self._take(glider)
+
+    def _let_go(self, jobs: Sequence[Job]) -> None:
+        """Give some files of a glider that are decoded their turn once more."""
+        for job in jobs:
+            self._runtime.backlog.decoded(job.header.id.glider)
+            self._settle_again(Path(job.file.path))
+
+    def _take(self, glider: str) -> None:
+        """Take the next file of a glider."""
+        job = self._runtime.backlog.decoded(glider)
+        if job is None:
+            return
+        try:
+            self._finish(job)
+        except StateError:
+            self._settle_again(Path(job.file.path))
+            raise
+
+    def _run(self, jobs: Sequence[Job]) -> Run | None:
+        """The first of these files that can be processed together; None where it is one that need not wait
+        for a worker."""
+        glider = jobs[0].header.id.glider
+        if self._runtime.ocean.field(glider) is not None:
+            return None
+        segments = list[Segment]()
+        for job in jobs[:1] if jobs[0].is_alone else jobs:
+            result = job.result
+            if (
+                not isinstance(result, Segment)
+                or result.id != job.header.id
+                or job.is_alone != jobs[0].is_alone
+            ):
+                break
+            if not self._is_as_decoded(job) or self._store.is_past(result.id):
+                break
+            if any(result.id.name == one.id.name for one in segments):
+                break
+            segments.append(result)
+        if len(segments) < 2 and not (segments and jobs[0].is_alone):
+            return None
+        return transaction.foreseen(self._store, segments)
+
+    def _is_as_decoded(self, job: Job) -> bool:
+        """Whether a file is still as it was when it was judged."""
+        return judgement.state(Path(job.file.path)) in (None, (job.file.size, job.file.mtime_ns))
+
+    def ran(self, news: Ran) -> None:
+        """Commit a run of files that a worker has processed. Raises StateError as `decoded`."""
+        backlog, glider = self._runtime.backlog, news.glider
+        if news.backlog is not backlog:
+            return
+        jobs, error = backlog.end_run(glider), news.future.exception()
+        if error is None:
+            self._commit(glider, jobs, news.future.result())
+        else:
+            log.warning(
+                "run of files could not be processed", glider=glider, files=len(jobs), reason=str(error)
+            )
+            if jobs[0].is_alone:
+                jobs[0].result = why_not(error)
+            for job in jobs:
+                job.is_alone = True  # which of them it was shows when each is processed by itself
+        self._go_on(glider)
+        self._runtime.feed()
+
+    def _commit(self, glider: str, jobs: Sequence[Job], done: Processed) -> None:
+        """Commit the outcomes of a run; where they do not hold any more, each file is processed again."""
+        backlog, begun = self._runtime.backlog, time.monotonic()
+        outcomes = None
+        files = [(job.file, job.result) for job in jobs if isinstance(job.result, Segment)]
+        if all(map(self._is_as_decoded, jobs)):
+            last = backlog.behind(glider) == len(jobs)
+            routing = self._routing_if_last(glider, last=last)
+            try:
+                with self._store.followed_by(backlog.behind(glider) - len(jobs)):
+                    outcomes = transaction.process_run(
+                        self._store,
+                        files,
+                        done,
+                        self._runtime.config.glider(glider),
+                        routing,
+                        time.time(),
+                        self._runtime.fields,
+                        layers_of(self._runtime.config, glider),
+                    )
+            except StateError:
+                self._let_go(jobs)
+                raise
+        if outcomes is None:
+            for _ in jobs:
+                self._take(glider)
+            return
+        seconds = (time.monotonic() - begun) / len(jobs)
+        for outcome in outcomes:
+            backlog.decoded(glider)
+            self._report(outcome, seconds)
 
     def _finish(self, job: Job) -> None:
         path, result, glider = Path(job.file.path), job.result, job.header.id.glider
-        if judgement.state(path) not in (None, (job.file.size, job.file.mtime_ns)):
+        if not self._is_as_decoded(job):
             # it has grown, or is another one: what was decoded may be of before or of after
             self._settle_again(path)
             self._notify_if_last(glider)
@@ -394,10 +506,12 @@ class Intake:
             return
         self.send(alerts)
 
-    def _routing_if_last(self, glider: str) -> Routing | None:
-        """Who is notified of a glider; None while more of its files are at hand, or may be: then the last
-        of them is reported for all."""
-        last = self._is_configured(glider) and not self._runtime.backlog.more(glider)
+    def _routing_if_last(self, glider: str, *, last: bool | None = None) -> Routing | None:
+        """Who is notified of a glider; None while more of its files are at hand (or it is not the `last` of
+        them), or may be: then the last of them is reported for all."""
+        if last is None:
+            last = not self._runtime.backlog.more(glider)
+        last = last and self._is_configured(glider)
         return self._runtime.routing if last and not self._may_more_come(glider) else None
 
     def _may_more_come(self, glider: str) -> bool:

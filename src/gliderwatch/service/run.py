@@ -6,14 +6,15 @@ committed if by then the same is to be processed (`service.transaction`).
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 from gliderwatch.errors import GliderwatchError, NotAssessed
 from gliderwatch.model import Segment
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
 from gliderwatch.sea.ocean_field import Field
+from gliderwatch.store.codec import encode
 from gliderwatch.store.segments import Plan
 
 
@@ -28,10 +29,12 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class Processed:
-    """A run that was processed: the outcome of each of its segments."""
+    """The outcome of each segment of a plan, and the state to be kept after each: as it is, as its record, or
+    None. The outcomes of a worker have no state but the last."""
 
-    run: Run
+    plan: Plan
     outcomes: tuple[Outcome, ...]
+    states: tuple[GliderState | bytes | None, ...]
 
 
 class StoppedError(GliderwatchError):
@@ -49,7 +52,16 @@ def processed(
             raise StoppedError(f"{segment.id.name} was not processed: the daemon ends")
         outcomes.append(_outcome(state, segment, params, ocean))
         state = outcomes[-1].state
-    return Processed(run, tuple(outcomes))
+    return Processed(run.plan, tuple(outcomes), tuple(outcome.state for outcome in outcomes))
+
+
+def processed_for_another(run: Run, params: GliderParams, is_kept: Sequence[bool]) -> Processed:
+    """Process a run in a worker: what is not to be kept is not sent back."""
+    done = processed(run, params, None)
+    *before, last = done.outcomes
+    records = [encode(one.state) if kept else None for one, kept in zip(before, is_kept, strict=False)]
+    bare = [replace(one, state=GliderState()) for one in before]
+    return Processed(run.plan, (*bare, last), (*records, last.state))
 
 
 def _outcome(state: GliderState, segment: Segment, params: GliderParams, ocean: Field | None) -> Outcome:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 import time
+from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
@@ -27,6 +28,8 @@ from gliderwatch.service.mail_pictures import MailPictures
 from gliderwatch.service.page_writer import PagesWritten
 from gliderwatch.service.relays import BatchesCame, RelayExchange, relay_settings
 from gliderwatch.service.routing import Routing, routing_of
+from gliderwatch.service.run import Processed, Run
+from gliderwatch.service.run_workers import RunWorkers
 from gliderwatch.slocum.caches import SensorLists, lists_folder
 from gliderwatch.slocum.decode import Decoder
 from gliderwatch.slocum.folders import Settling
@@ -99,7 +102,16 @@ class Decoded:
         return error if isinstance(error, Exception) else self.future.result()
 
 
-News = Change | Decoded | PagesWritten | BatchesCame | signal.Signals
+@dataclass(frozen=True, slots=True)
+class Ran:
+    """News of a worker: a run of a glider's files is processed, or could not be."""
+
+    backlog: Backlog
+    glider: str
+    future: Future[Processed]
+
+
+News = Change | Decoded | Ran | PagesWritten | BatchesCame | signal.Signals
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +125,7 @@ class Runtime:
     settling: Settling
     watcher: Watcher
     decoder: Decoder
+    workers_of_runs: RunWorkers
     lists: SensorLists
     backlog: Backlog
     dispatcher: Dispatcher
@@ -135,6 +148,7 @@ class Runtime:
         self.watcher.stop()
         if after is None:
             self.decoder.close()
+            self.workers_of_runs.stop()
         if after is None or after.dispatcher is not self.dispatcher:
             self.dispatcher.stop()
             self.pictures.stop()
@@ -150,6 +164,12 @@ class Runtime:
         while self.backlog.decoding < 2 * self.workers and (job := self.backlog.next()) is not None:
             job.begun = time.monotonic()
             self.decoder.submit(Path(job.file.path)).add_done_callback(partial(self._decoded, job))
+
+    def process(self, glider: str, run: Run, is_kept: Sequence[bool]) -> None:
+        """Have a run of a glider's next files processed by a worker."""
+        future = self.workers_of_runs.submit(run, self.config.glider(glider), is_kept)
+        self.backlog.begin_run(glider, len(run.segments))
+        future.add_done_callback(lambda done: self.news.put(Ran(self.backlog, glider, done)))
 
     def _decoded(self, job: Job, future: Future[Segment]) -> None:
         self.news.put(Decoded(self.backlog, job, future))
@@ -211,6 +231,7 @@ def build(
     lists = SensorLists(lists_folder(Path(config.state.path)))
     # shared: what follows can no longer refuse the configuration
     decoder = Decoder((), max_workers=workers) if before is None else before.decoder
+    runs = RunWorkers() if before is None else before.workers_of_runs
     parts = Runtime(
         config,
         news,
@@ -219,6 +240,7 @@ def build(
         Settling(config.dockserver.settle_seconds),
         watcher,
         decoder,
+        runs,
         lists,
         Backlog(),
         dispatcher,

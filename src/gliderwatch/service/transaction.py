@@ -102,6 +102,57 @@ def process_file(
     return _committed(store, commit, done, params, ocean, stopping)
 
 
+def foreseen(store: Store, segments: Sequence[Segment]) -> Run | None:
+    """The run of some segments of one glider that come after all that are held, in order of time; None where
+    they do not, or where earlier ones are to be processed again before them."""
+    with store.guarded():
+        plan = store.segments.plan_after(segments[0].id)
+        if plan is None or len(plan.segments) > 1:
+            return None
+        offset = plan.segments[0].opened_at - segments[0].id.opened_at
+        right = [moved(one, offset) for one in segments]
+        identities = [one.id for one in right]
+        if len({one.name for one in identities}) < len(right) or identities != sorted(identities):
+            return None
+        if any(store.segments.completeness(one.id) is not None for one in segments[1:]):
+            return None
+        return _run(store, replace(plan, segments=tuple(identities)), right)
+
+
+def process_run(
+    store: Store,
+    files: Sequence[tuple[File, Segment]],
+    done: Processed,
+    params: GliderParams,
+    routing: Routing | None,
+    now: float,
+    fields: Sequence[FleetField] = (),
+    layers: GliderLayers | None = None,
+) -> tuple[FileOutcome, ...] | None:
+    """Commit a run (`foreseen`) that was processed elsewhere, in one transaction; its last file has the
+    messages. None, and nothing is written, where by now another one is to be processed.
+    """
+    glider = files[0][1].id.glider
+    taken = [replace(file, status=Status.TAKEN, reason="") for file, _ in files]
+    try:
+        with store.transaction():
+            firsts = list[SegmentId]()
+            for file, (_, segment) in zip(taken, files, strict=True):
+                store.receive(file, segment.id, segment.last_t, now)
+                firsts.append(_place(store, segment))
+            _, state = _keep(store, min(firsts), None, done, layers)
+            for _, segment in files if fields else ():
+                fields_of_sea.add(store, fields, store.segments.kept(segment.id))
+            advice = look(store, fields, glider, state) if fields and routing is not None else ()
+            alerts = _due_messages(store, glider, params, routing, now)
+            asked = layers is not None and routing is not None
+            deep = layers_of_sea.newest(store, glider) if asked else None
+    except _ToProcessError:
+        return None
+    found = [FileOutcome(f, o.assessments) for f, o in zip(taken, done.outcomes, strict=True)]
+    return (*found[:-1], replace(found[-1], alerts=alerts, advice=advice, layers=deep))
+
+
 def record_file(
     store: Store, file: File, params: GliderParams, routing: Routing | None, now: float
 ) -> FileOutcome:
@@ -299,13 +350,13 @@ def _keep(
     """Keep the outcomes of a segment that is held and all after it; `fresh` is one of them that is at hand,
     whole. Raises _ToProcessError where `done` is not of the same run."""
     plan = store.segments.plan(first)
-    if done is None or not done.run.plan.is_as(plan):
+    if done is None or not done.plan.is_as(plan):
         whole = {} if fresh is None else {fresh.id: fresh}
         segments = [whole[one] if one in whole else store.segments.get(one) for one in plan.segments]
         raise _ToProcessError(_run(store, plan, segments))
     dives: dict[float, Assessment] = {}
-    for identity, outcome in zip(plan.segments, done.outcomes, strict=True):
-        store.keep(identity, outcome)
+    for identity, outcome, after in zip(plan.segments, done.outcomes, done.states, strict=True):
+        store.keep(identity, outcome, after)
         if layers is not None:
             layers_of_sea.learn(store, identity, layers)
         dives = {t: a for t, a in dives.items() if t < outcome.since} | {

@@ -262,6 +262,10 @@ class Segments:
         self.clocks.rollback()
         self._changed.clear()
 
+    def changed(self, glider: str) -> None:
+        """What was planned of a glider before this transaction holds no more."""
+        self._changed.add(glider)
+
     def completeness(self, identity: SegmentId) -> tuple[int, int, str] | None:
         """Of the copy of a segment that is held, None when there is none; by the glider's clock."""
         row = self._held(identity)
@@ -468,22 +472,31 @@ class Segments:
         ).fetchone()
         return row
 
-    def checkpoint(self, identity: SegmentId, state: GliderState) -> None:
-        """Keep the state after a segment, and the surfacing that it leads to expect."""
+    def is_kept(self, name: str, behind: int) -> bool:
+        """Whether the state after a segment is written where so many files are at hand behind it."""
+        return behind < RECENT or _is_milestone(name)
+
+    def checkpoint(
+        self, identity: SegmentId, state: GliderState | bytes | None, expected: NextSurfacing | None
+    ) -> None:
+        """Keep the state after a segment (or its record as it is, or nothing: then more of its run follow),
+        and the surfacing that it leads to expect."""
         self._changed.add(identity.glider)
         key = (identity.glider, identity.opened_at, identity.name)
-        if self.following:
-            self.ahead.keep(identity, state)
-        else:
-            self.ahead.drop(identity.glider)
-        is_kept = self.following < RECENT or _is_milestone(identity.name)
+        record = state if isinstance(state, bytes) else None
+        if isinstance(state, GliderState):
+            if self.following:
+                self.ahead.keep(identity, state)
+            else:
+                self.ahead.drop(identity.glider)
+            record = codec.encode(state) if self.is_kept(identity.name, self.following) else None
         self._db.execute(
             "UPDATE segments SET checkpoint = ?1 WHERE glider = ?2 AND opened_at = ?3 AND name = ?4 "
             "AND (?1 IS NOT NULL OR checkpoint IS NOT NULL)",
-            (codec.encode(state) if is_kept else None, *key),
+            (record, *key),
         )
         self._db.execute("DELETE FROM expected WHERE glider = ? AND opened_at = ? AND segment = ?", key)
-        if (e := state.memory.expected) is not None:
+        if (e := expected) is not None:
             row = (identity.glider, identity.name, identity.opened_at, e.after, codec.plain_encode(e))
             self._db.execute("INSERT INTO expected VALUES (?, ?, ?, ?, ?)", row)
 

@@ -18,7 +18,7 @@ from gliderwatch.model import (
     Unusable,
 )
 from gliderwatch.navigation.clock import SAME_OPENING, ClockStep
-from gliderwatch.pipeline import Outcome
+from gliderwatch.pipeline import GliderState, Outcome
 from gliderwatch.store import codec, outbox, retention, segments
 from gliderwatch.store.codec import File, Status, Undelivered, file_of, values
 from gliderwatch.store.database import MEMORY, SCHEMA, connect, guarded, has_table, read_only
@@ -183,10 +183,11 @@ class Store:
             [(i.id, glider, i.opened_at, i.cleared_at, codec.plain_encode(i)) for i in outcome.incidents],
         )
 
-    def keep(self, identity: SegmentId, outcome: Outcome) -> None:
-        """Keep the outcome of a segment: its results (`apply`), and the state after it."""
+    def keep(self, identity: SegmentId, outcome: Outcome, state: GliderState | bytes | None) -> None:
+        """Keep the outcome of a segment: its results (`apply`), and the state after it as in
+        `Segments.checkpoint`."""
         self.apply(identity.glider, outcome)
-        self.segments.checkpoint(identity, outcome.state)
+        self.segments.checkpoint(identity, state, outcome.expected)
 
     def record_sign(self, identity: SegmentId, last_t: float | None, now: float) -> None:
         """Note a sign of life: a file of a segment came, with its last sample (s) if it was read; by the
