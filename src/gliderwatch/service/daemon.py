@@ -231,6 +231,7 @@ class Daemon:
         if self._caught_up and time.monotonic() >= self._next_tick:
             self._tick()
         if self._is_idle():
+            self._runtime.workers_of_runs.stop()
             self._bring_fields_up_to_date()
             self._retention.turn(self._runtime.config.state.keep_days, time.time(), time.monotonic())
         if self._caught_up:

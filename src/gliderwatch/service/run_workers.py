@@ -26,7 +26,8 @@ MOST = 4
 class RunWorkers:
     """A process for each core, `MOST` at most, begun when there is a run; used by one thread.
 
-    They are not those that decode: no foreign code that a damaged file leads astray has been in them.
+    They end where nothing is at hand: a daemon that waits needs no memory for them. They are not those that
+    decode: no foreign code that a damaged file leads astray has been in them.
     """
 
     def __init__(self) -> None:
