@@ -69,8 +69,8 @@ def test_wrong_arguments_are_told_in_a_line_and_end_with_2(
     [
         ["--version"],
         ["check", "-h"],
-        ["status", "-c", "nowhere.yml"],
-        ["test-alert", "-c", "gliderwatch.yml"],
+        pytest.param(["status", "-c", "nowhere.yml"], marks=pytest.mark.slow),
+        pytest.param(["test-alert", "-c", "gliderwatch.yml"], marks=pytest.mark.slow),
     ],
 )
 def test_commands_of_these_tests_do_what_the_installed_program_does(

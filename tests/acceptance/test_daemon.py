@@ -35,7 +35,10 @@ from gliderwatch.store.state_file import Status
 # --------------------------------------------------------------------------- signals
 
 
-@pytest.mark.parametrize("program", [(GLIDERWATCH,), ()], ids=["installed", "forked"])
+@pytest.mark.parametrize(
+    "program",
+    [pytest.param((GLIDERWATCH,), id="installed", marks=pytest.mark.slow), pytest.param((), id="forked")],
+)
 def test_sigterm_ends_it_cleanly(site: Site, program: Sequence[object]) -> None:
     with Daemon(site, program) as daemon:
         put(site, *FILES)

@@ -131,6 +131,7 @@ def test_a_simulated_mission_in_any_order_with_kills_ends_as_a_replay_does(tmp_p
 
 
 @pytest.mark.real
+@pytest.mark.slow
 def test_a_real_mission_in_any_order_with_kills_ends_as_a_replay_does(
     shared_data: Path, tmp_path: Path
 ) -> None:

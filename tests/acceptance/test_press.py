@@ -96,6 +96,7 @@ def answers(url: str) -> bool:
     return False
 
 
+@pytest.mark.slow  # test_web presses it by HTTP
 def test_a_button_pressed_on_a_phone_stops_the_escalation(tmp_path: Path) -> None:
     mission, site, port = remora(2.2, onset=1.2), Site(tmp_path), free_port()
     site.caches(mission)

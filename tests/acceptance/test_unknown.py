@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+import pytest
+
 from acceptance.support import TRACEBACK, Daemon, Site, command, lines, mail_server, until
 from gliderwatch.simulate.delivery import arrivals, cache, write_cache
 from gliderwatch.simulate.glider import simulate
@@ -12,6 +14,8 @@ from gliderwatch.simulate.scenario import Mission, Scenario
 from gliderwatch.slocum.caches import checksum
 from gliderwatch.slocum.header import parse_header
 from gliderwatch.store.state_file import Status
+
+pytestmark = pytest.mark.slow  # integration/test_unknown has the same without a service
 
 DAY = 86400.0
 GLIDER = "cora"

@@ -61,7 +61,7 @@ def test_who_is_wrong_among_six_and_by_how_much(fault: Fault, size: float) -> No
 
 
 def test_healthy_fleets_are_not_called_faulty() -> None:
-    for seed in range(4):
+    for seed in range(2):
         currents = fleet(4, seed)
         assert [cross_check(currents, f"g{k}").sure for k in range(4)] == [None] * 4
 
