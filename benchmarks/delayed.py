@@ -1,8 +1,9 @@
 """What delayed mode gains over near real time on simulated seas, where the truth is known.
 
-`python benchmarks/delayed.py [--seas rotary,mixed] [--seeds 2] [--days 20] [--lost 0.3]`: gliders of the
-classes of `simulate/seas.py`, through their files; error (rms, cm/s) of a component of the instantaneous
-current at each half hour under water from day 3 on, and the part inside of 95 %, of
+`python benchmarks/delayed.py [--seas rotary,mixed] [--seeds 2] [--days 20] [--lost 0.3]
+[--page docs/archive.md]`: gliders of the classes of `simulate/seas.py`, through their files; error (rms,
+cm/s) of a component of the instantaneous current at each half hour under water from day 3 on, and the part
+inside of 95 %, of
 
 - foreseen: what was known when the dive began;
 - near real time: what was known once it had ended;
@@ -10,7 +11,8 @@ current at each half hour under water from day 3 on, and the part inside of 95 %
 - as on board: delayed, where the reckoning leaves out the angle of attack;
 - 002: the two-stage filter of paper 002, forward (its near real time) and both ways (its delayed mode).
 
-`--lost` is the part of the dives whose files never came: their currents count too. Paper 002 has 6.5 to 7
+`--lost` is the part of the dives whose files never came: their currents count too. `--page` puts the table
+where a page names its part of lost dives (`<!-- lost 0.3 -->` to `<!-- end -->`). Paper 002 has 6.5 to 7
 near real time and below 6 delayed, against an ADCP some km away.
 """
 
@@ -24,7 +26,7 @@ from pathlib import Path
 import numpy as np
 from sea_runs import HEALTHY, Job, flight, scenario
 
-from gliderwatch.archive.hindcast import mean_currents
+from gliderwatch.archive.delayed import mean_currents
 from gliderwatch.estimation.dive_measurement import observe
 from gliderwatch.model import Array, Dive
 from gliderwatch.navigation.geodesy import to_plane
@@ -135,8 +137,8 @@ def errors(job: Job, lost: float) -> tuple[dict[str, tuple[Array, Array]], Array
 
 def row(
     name: str, some: Sequence[tuple[dict[str, tuple[Array, Array]], Array]], low: float, high: float
-) -> None:
-    """Print the errors of flights in dives that last so many hours."""
+) -> str:
+    """The errors of flights in dives that last so many hours, printed too; nothing where there is no dive."""
     rms, cells = {}, []
     for mode in MODES:
         error, inside = (
@@ -144,12 +146,23 @@ def row(
             for i in range(2)
         )
         if not len(error):
-            return
+            return ""
         rms[mode] = 100 * float(np.sqrt(np.mean(error**2)))
         covered = "" if np.isnan(inside).any() else f" ({np.mean(inside):.0%})"
         cells.append(f"{rms[mode]:.1f}{covered}")
     ratio = rms["delayed"] / rms["near real time"]
-    print(f"| {name} | {' | '.join(cells)} | {ratio:.2f} |", flush=True)
+    words = f"| {name} | {' | '.join(cells)} | {ratio:.2f} |"
+    print(words, flush=True)
+    return words + "\n"
+
+
+def put(page: Path, lost: float, table: str) -> None:
+    """Put a table where a page has its place for it."""
+    begin, end = f"<!-- lost {lost:g} -->\n", "<!-- end -->"
+    before, found, rest = page.read_text(encoding="utf-8").partition(begin)
+    if not found:
+        raise SystemExit(f"{page} has no line {begin}")
+    page.write_text(before + begin + table + end + rest.partition(end)[2], encoding="utf-8")
 
 
 def main() -> None:
@@ -160,18 +173,24 @@ def main() -> None:
     parser.add_argument("--days", type=float, default=20.0)
     parser.add_argument("--lost", type=float, default=0.0)
     parser.add_argument("--kept", type=Path, default=Path("build/seas"))
+    parser.add_argument("--page", type=Path)
     options = parser.parse_args()
-    print(f"| sea | {' | '.join(MODES)} | delayed to near real time |")
-    print("| --- |" + " --- |" * (len(MODES) + 1))
+    table = f"| sea | {' | '.join(MODES)} | delayed to near real time |\n| --- |" + " --- |" * (
+        len(MODES) + 1
+    )
+    print(table, flush=True)
+    table += "\n"
     all_of_them = []
     for name in options.seas.split(","):
         seeds = range(options.first, options.first + options.seeds)
         some = [errors(Job(name, seed, HEALTHY, options.days, options.kept), options.lost) for seed in seeds]
-        row(name, some, 0.0, 99.0)
+        table += row(name, some, 0.0, 99.0)
         all_of_them += some
-    row("all", all_of_them, 0.0, 99.0)
+    table += row("all", all_of_them, 0.0, 99.0)
     for name, (low, high) in LENGTHS.items():
-        row(name, all_of_them, low, high)
+        table += row(name, all_of_them, low, high)
+    if options.page is not None:
+        put(options.page, options.lost, table)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -31,6 +32,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     mission = simulate(replace(scenario, faults=faults))
     write_mission(folder / "sent", folder / "cache", mission)
     write_full_rate(folder / "recovered", mission)
+    true = [(dive.t_dive, dive.t_surface, dive.speed) for dive in mission.truth]
+    (folder / "truth.json").write_text(json.dumps(true))
     return folder
 
 
@@ -69,8 +72,23 @@ def test_the_report_is_a_page_a_paper_and_numbers(made: tuple[Path, Mission, Hin
         assert len(speed["through_water"]) == found.full.dives
         assert speed["through_water"].units == "m/s"
         assert np.isfinite(data["delayed_mode_east"]["current"][:]).all()
-        assert len(data["track"]["surfacing_lat"]) > 10
+        way = data["track"]
+        assert len(way["surfacing_lat"]) > 10
+        t, lat = way["delayed_time"][:], way["delayed_lat"][:]
+        ends = np.interp(way["surfacing_time"][1:], t, lat)
+        assert np.abs(ends - way["surfacing_lat"][1:]).max() * 111e3 < 50.0
         assert np.ma.median(data["error_of_the_track"]["of_the_dive"][:]) < 150.0
+
+
+def test_the_speed_in_delayed_mode_is_the_true_one(place: Path, made: tuple[Path, Mission, Hindcast]) -> None:
+    out, _, _ = made
+    true = json.loads((place / "truth.json").read_text())
+    with netCDF4.Dataset(out / report.NUMBERS) as data:
+        t, speed = (data["delayed_mode_speed"][name][:] for name in ("delayed_time", "delayed"))
+    dives = [min(true, key=lambda dive: abs((dive[0] + dive[1]) / 2 - at)) for at in t]
+    off = np.abs(speed - [dive[2] for dive in dives])
+    assert np.median(off[:7]) < 0.01
+    assert np.median(off[9:]) < 0.03  # with the remora
 
 
 def test_what_was_measured_around_each_flag_is_shown(made: tuple[Path, Mission, Hindcast]) -> None:

@@ -11,6 +11,7 @@ import netCDF4
 import numpy as np
 
 from gliderwatch import __version__
+from gliderwatch.archive import delayed
 from gliderwatch.archive.hindcast import Evidence
 from gliderwatch.archive.spells import Spell
 from gliderwatch.errors import GliderwatchError
@@ -20,6 +21,7 @@ from gliderwatch.figures.plots import Line, Panel
 from gliderwatch.messages.formatting import utc
 from gliderwatch.model import Array, Assessment
 from gliderwatch.navigation.geodesy import displacement, from_plane
+from gliderwatch.sea.smoother import Currents
 
 TRACK = "Track"
 """Name of the figure that is no panel over time."""
@@ -39,13 +41,14 @@ def panels(evidence: Evidence) -> list[Panel]:
 
 def _off(evidence: Evidence) -> Panel:
     fixes, led = track(evidence)
-    t = np.array([d.t_surface for d in evidence.best if d.lat is not None and d.lon is not None])
     off = np.array([np.hypot(*displacement(*a, *b)) for a, b in zip(led, fixes, strict=True)])
     shows = (
         "How far from each surfacing the estimated speed and flow would have led the glider, from the "
         "surfacing before and on the course that it made."
     )
-    return Panel("Error of the track", "error (m)", shows, (Line("of the dive", t, off),), zero=True)
+    return Panel(
+        "Error of the track", "error (m)", shows, (Line("of the dive", _fixed(evidence), off),), zero=True
+    )
 
 
 _UNITS = {
@@ -101,7 +104,24 @@ def _delayed(evidence: Evidence) -> list[Panel]:
             "tide and its residual, and what each dive measured."
         )
         made.append(Panel(f"Delayed mode, {way}", f"{way} (m/s)", shows, lines))
-    return made
+    return [*made, _delayed_speed(evidence, found)]
+
+
+def _delayed_speed(evidence: Evidence, found: Currents) -> Panel:
+    at, speed = delayed.speeds(evidence.dives, found)
+    some = [(d.t_surface, d.speed) for d in evidence.best if d.speed is not None]
+    then, online = np.array(some, dtype=float).reshape(-1, 2).T
+    shows = (
+        "Speed through the water in delayed mode: what the currents of the whole mission leave of the ground "
+        "velocity of each dive. Dashed: as it was estimated after the dive."
+    )
+    lines = (Line("delayed", at, speed), Line("after the dive", then, online))
+    return Panel("Delayed mode, speed", "speed (m/s)", shows, lines, zero=True)
+
+
+def _fixed(evidence: Evidence) -> Array:
+    """The times (s) of the surfacings that `track` has."""
+    return np.array([d.t_surface for d in evidence.best if d.lat is not None and d.lon is not None])
 
 
 def track(evidence: Evidence) -> tuple[Array, Array]:
@@ -130,6 +150,11 @@ def track_figure(evidence: Evidence) -> Any:
     figure = plots.library().figure.Figure(figsize=(5.4, 4.6), layout="constrained")
     axis = figure.add_subplot()
     axis.plot(fixes[:, 1], fixes[:, 0], "-", color=plots.COLOURS[0], linewidth=1.2, label="surfacings")
+    if evidence.delayed is not None:
+        _, places = delayed.way(evidence.dives, evidence.delayed.delayed)
+        axis.plot(
+            places[:, 1], places[:, 0], "-", color=plots.COLOURS[3], linewidth=0.7, label="delayed mode"
+        )
     good = np.isfinite(led).all(axis=1)
     axis.plot(led[good, 1], led[good, 0], "x", color=plots.COLOURS[1], markersize=4, label="by the estimate")
     if len(evidence.centres):
@@ -150,21 +175,26 @@ def write_numbers(path: Path, evidence: Evidence, made: Sequence[Panel]) -> None
     try:
         with netCDF4.Dataset(path, "w") as data:
             data.setncatts({"Conventions": "CF-1.8", "source": f"gliderwatch {__version__}"})
-            fixes, led = track(evidence)
-            group = data.createGroup("track")
-            group.setncatts({"basis_function_width": evidence.width, "basis_function_width_units": "m"})
-            for name, values in (
-                ("surfacing", fixes),
-                ("estimate", led),
-                ("basis_function", evidence.centres),
-            ):
-                group.createDimension(name, len(values))
-                for i, (axis, unit) in enumerate((("lat", "degrees_north"), ("lon", "degrees_east"))):
-                    _put(group, f"{name}_{axis}", name, values[:, i], unit, f"{name} {axis}")
+            _places(data.createGroup("track"), evidence)
             for panel in made:
                 _panel(data.createGroup(_word(panel.name)), panel)
     except (OSError, RuntimeError) as error:
         raise GliderwatchError(f"{path} cannot be written: {error}") from None
+
+
+def _places(group: netCDF4.Group, evidence: Evidence) -> None:
+    group.setncatts({"basis_function_width": evidence.width, "basis_function_width_units": "m"})
+    fixes, led = track(evidence)
+    lines = {"surfacing": fixes, "estimate": led, "basis_function": evidence.centres}
+    times = {"surfacing": _fixed(evidence)}
+    if evidence.delayed is not None:
+        times["delayed"], lines["delayed"] = delayed.way(evidence.dives, evidence.delayed.delayed)
+    for name, values in lines.items():
+        group.createDimension(name, len(values))
+        for i, (axis, unit) in enumerate((("lat", "degrees_north"), ("lon", "degrees_east"))):
+            _put(group, f"{name}_{axis}", name, values[:, i], unit, f"{name} {axis}")
+    for name, t in times.items():
+        _put(group, f"{name}_time", name, t, SINCE, f"time of {name}")
 
 
 def _panel(group: netCDF4.Group, panel: Panel) -> None:

@@ -11,11 +11,11 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from gliderwatch.archive.delayed import losses, mean_currents
 from gliderwatch.archive.missions import Mission, is_full
 from gliderwatch.archive.spells import Spell, spells
 from gliderwatch.config import load
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.estimation.dive_measurement import observe
 from gliderwatch.model import Array, Assessment, Dive, Incident, SegmentId, readonly
 from gliderwatch.score.graft import navigate
 from gliderwatch.score.grid import configured, settings_of
@@ -94,14 +94,16 @@ class Hindcast:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What a report draws: assessments by each kind of files, the currents in delayed mode, the dives' own,
-    the places (degrees, (n, 2)) of the basis functions of the papers' law with their ``width`` (m), and what
-    was measured around the flags."""
+    """What a report draws: assessments by each kind of files, the currents in delayed mode, those measured,
+    the ``dives`` that they are of, the places (degrees, (n, 2)) of the basis functions of the papers' law
+    with their ``width`` (m), and what was measured around the flags.
+    """
 
     online: tuple[Assessment, ...]
     full: tuple[Assessment, ...]
     delayed: Delayed | None
     measured: tuple[MeanCurrent, ...]
+    dives: tuple[Dive, ...]
     centres: Array
     width: float
     spells: tuple[Spell, ...]
@@ -115,12 +117,12 @@ class Evidence:
 @dataclass(frozen=True, slots=True)
 class Replays:
     """What the replays of a mission left: by kind of files (`online`, `full`) the assessments and what they
-    come to, the currents of its dives, the places of the basis functions (degrees, (n, 2)) and their width
+    come to, its ``dives``, the places of the basis functions (degrees, (n, 2)) and their width
     (m), what was measured around the flags by the fullest files, the estimator."""
 
     assessed: dict[str, tuple[Assessment, ...]]
     judged: dict[str, Judged]
-    measured: list[MeanCurrent]
+    dives: list[Dive]
     centres: Array
     width: float
     spells: tuple[Spell, ...]
@@ -137,7 +139,7 @@ def replays(
     """
     assessed: dict[str, tuple[Assessment, ...]] = {"online": (), "full": ()}
     judged = dict[str, Judged]()
-    measured, centres, around = list[MeanCurrent](), readonly(np.empty((0, 2))), tuple[Spell, ...]()
+    dives, centres, around = list[Dive](), readonly(np.empty((0, 2))), tuple[Spell, ...]()
     config = configured(mission.glider, settings_of(estimator)) if settings is None else load(settings)
     caches = sorted({path.parent for path in folder.rglob("*") if is_cache(path.name)})
     caches += caches_in(folder.resolve().parent)
@@ -150,19 +152,20 @@ def replays(
         assessed[kind] = tuple(store.assessments(mission.glider))
         judged[kind] = judge(assessed[kind], store.incidents(mission.glider))
         segments = (store.segments.get(identity) for identity in store.segments.of(mission.glider))
-        measured = mean_currents(navigate(segments)) or measured
+        dives = navigate(segments) or dives
         newest, _ = store.segments.resume(SegmentId(float("inf"), mission.glider, ""))
         centres = newest.memory.estimate.learner.centres
         around = spells(assessed[kind], chosen, cache_folders(request))
         store.close()
     params = config.glider(mission.glider)
     used = estimator if settings is None else params.estimator
-    return Replays(assessed, judged, measured, centres, params.learner.sigma, around, used)
+    return Replays(assessed, judged, dives, centres, params.learner.sigma, around, used)
 
 
 def hindcast(mission: Mission, made: Replays) -> tuple[Hindcast, Evidence]:
     """What the replays of a mission come to. Raises GliderwatchError where nothing could be judged."""
-    assessed, judged, measured = made.assessed, made.judged, made.measured
+    assessed, judged = made.assessed, made.judged
+    measured = mean_currents(made.dives, losses(assessed["full"] or assessed["online"]))
     if not any(assessed.values()):
         raise GliderwatchError(
             f"{mission.place}: no dive of {mission.glider} could be judged: see why by "
@@ -181,7 +184,10 @@ def hindcast(mission: Mission, made: Replays) -> tuple[Hindcast, Evidence]:
         None if delayed is None else float(np.median(delayed.delayed.sigma)),
     )
     online, full = assessed["online"], assessed["full"]
-    return found, Evidence(online, full, delayed, tuple(measured), made.centres, made.width, made.spells)
+    dives = tuple(made.dives)
+    return found, Evidence(
+        online, full, delayed, tuple(measured), dives, made.centres, made.width, made.spells
+    )
 
 
 def judge(dives: Sequence[Assessment], incidents: Iterable[Incident]) -> Judged:
@@ -246,27 +252,6 @@ def _end(one: Found) -> float:
 
 def _rms(values: Sequence[float]) -> float | None:
     return float(np.sqrt(np.mean(np.square(values)))) if values else None
-
-
-def mean_currents(dives: Iterable[Dive]) -> list[MeanCurrent]:
-    """The depth-averaged currents of dives, with the angle of attack in the reckoning.
-
-    On board the way through the water is reckoned from depth rate and pitch, so that the part that the angle
-    of attack takes (`slip` of an observation) is left in the current: it is given back, half of it being its
-    error (002, "delayed mode").
-    """
-    out = list[MeanCurrent]()
-    for dive in dives:
-        if dive.track is None or dive.current is None or dive.end is None:
-            continue
-        seen = observe(dive)
-        rest = seen.rest
-        if rest is None or seen.current is None or (out and seen.start < out[-1].end):
-            continue
-        lost = seen.slip * rest
-        sigma = float(np.hypot(seen.current_sigma, 0.5 * np.hypot(*lost)))
-        out.append(MeanCurrent(seen.start, seen.end, readonly(seen.current + lost), sigma, dive.end.lat))
-    return out
 
 
 def fingerprint(mission: Mission, files: Iterable[Path], estimator: str, chosen: str) -> str:
