@@ -112,7 +112,7 @@ def client(address: str | None, workers: int) -> Iterator[Client]:
                 n_workers=workers,
                 threads_per_worker=1,
                 processes=True,
-                dashboard_address=None,
+                dashboard_address="127.0.0.1:0",  # any port that is free, and none for others to see
                 silence_logs=50,
             )
             here = Client(own)
