@@ -18,13 +18,13 @@ T0, HOUR, W = 1.7e9, 3600.0, 0.3
 SEA = Sea(eddy=0.05, reach=20e3, gradient=0.05, inertial=0.05, noise=0.02)
 
 
-def fleet(n: int, seed: int) -> list[DiveCurrent]:
-    """Two and a half days of gliders on steady headings within 50 km, in a sea with tides."""
+def fleet(n: int, seed: int, hours: float = 60.0) -> list[DiveCurrent]:
+    """Some days of gliders on steady headings within 50 km, in a sea with tides."""
     rng, out = np.random.default_rng(seed), []
     for g in range(n):
         at, t, angle = rng.uniform(-20e3, 20e3, 2), rng.uniform(0, 3 * HOUR), rng.uniform(0, 2 * np.pi)
         course = np.array([np.sin(angle), np.cos(angle)])
-        while t < 60 * HOUR:
+        while t < hours * HOUR:
             start, end = (
                 Fix(T0 + t + 3 * HOUR * k, *from_plane(at + 900 * k * course, 50.0, 0.0)) for k in (0, 1)
             )
@@ -51,12 +51,12 @@ def wrong(
 
 @pytest.mark.parametrize(("fault", "size"), [(Fault.LOSS, 0.4), (Fault.TURN, -0.4)])
 def test_who_is_wrong_among_six_and_by_how_much(fault: Fault, size: float) -> None:
-    currents = wrong(fleet(6, 4), fault, size, "g2")
+    currents = wrong(fleet(6, 4, 96.0), fault, size, "g2", 66.0)
     found = cross_check(currents, "g2").sure
     assert found is not None
     assert (found.glider, found.fault) == ("g2", fault)
     assert found.size == pytest.approx(size, abs=3 * found.sigma)
-    assert abs(found.since - (T0 + 24 * HOUR)) < 10 * HOUR
+    assert abs(found.since - (T0 + 66 * HOUR)) < 10 * HOUR
     assert all(cross_check(currents, f"g{k}").sure is None for k in (0, 1, 3, 4, 5))
 
 
@@ -87,7 +87,7 @@ def test_nobody_near_nothing_to_compare() -> None:
 
 
 def test_what_is_small_or_short_is_not_sure() -> None:
-    found = cross_check(wrong(fleet(6, 4), Fault.LOSS, 0.4, "g2"), "g2")
+    found = cross_check(wrong(fleet(6, 4, 96.0), Fault.LOSS, 0.4, "g2", 66.0), "g2")
     assert found.found is not None
     for weaker in ({"size": 0.1}, {"ratio": 11.0}, {"dives": 3}):
         assert Check(found.neighbours, 1e3, replace(found.found, **weaker), None).sure is None
@@ -117,7 +117,7 @@ def a_dive():
 
 
 def test_a_sure_fault_comes_with_what_the_others_measured() -> None:
-    currents = wrong(healthy := fleet(6, 4), Fault.LOSS, 0.4, "g2")
+    currents = wrong(healthy := fleet(6, 4, 96.0), Fault.LOSS, 0.4, "g2", 66.0)
     found = fleet_reference(currents, "g2")
     assert found is not None and found.fault is not None
     last = [k for k, each in enumerate(currents) if each.glider == "g2"][-1]

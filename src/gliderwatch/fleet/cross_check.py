@@ -34,15 +34,18 @@ from gliderwatch.fleet.constants import (
     MOST_LOSS,
     MOST_ONE_WAY,
     NEAR,
+    OWN_WATER,
     PROVISIONAL_DOUBT,
     SEA_EDDIES,
     SEA_GRADIENTS,
     SEA_INERTIAL,
+    SEA_MEMORY,
     SEA_NOISES,
     SEA_REACHES,
     SHARED_SURE,
     SURE,
     UNKNOWN_DOUBT,
+    WATER_CLEARER,
 )
 from gliderwatch.fleet.flow import (
     DiveCurrent,
@@ -91,7 +94,8 @@ class Check:
 
     ``found`` is the likeliest fault of it (None: none is likely), ``others`` the likeliest of another glider,
     ``common`` the likeliest that all have alike (its ``glider`` is empty); ``one_way`` is the length of their
-    mean course, ``sea`` the one that suits the currents best where nothing is wrong.
+    mean course, ``sea`` the one that suits the currents best where nothing is wrong. ``own_water``: the ratio
+    for water about the glider that no other meets, as a front is.
     """
 
     neighbours: tuple[str, ...]
@@ -101,6 +105,7 @@ class Check:
     common: Hypothesis | None = None
     one_way: float = 0.0
     sea: Sea = Sea()
+    own_water: float = -math.inf
 
     @property
     def sure(self) -> Hypothesis | None:
@@ -113,7 +118,8 @@ class Check:
             common = 0.0  # on one course it is a current, of which the sea has as much as it likes
         if common > max(own, other) + CLEARER:
             return self.common if _is_large(self.common) else None
-        return self.found if own > max(other, common) + CLEARER and _is_large(self.found) else None
+        clear = own > max(other, common) + CLEARER and own > self.own_water + WATER_CLEARER
+        return self.found if clear and _is_large(self.found) else None
 
     @property
     def doubted(self) -> Hypothesis | None:
@@ -146,14 +152,16 @@ def cross_check(currents: Sequence[DiveCurrent], glider: str) -> Check | None:
     nearest = min(_distance(each, last) for each in chosen if each.glider != glider)
     seas = _Seas(chosen)
     tried = list(_candidates(chosen))
+    found = seas.likeliest([each for each in tried if each.glider == glider])
     return Check(
         neighbours,
         nearest,
-        seas.likeliest([each for each in tried if each.glider == glider]),
+        found,
         seas.likeliest([each for each in tried if each.glider not in ("", glider)]),
         seas.likeliest([each for each in tried if not each.glider]),
         float(np.hypot(*np.mean([each.course for each in chosen], axis=0))),
         seas.usual,
+        -math.inf if found is None else seas.own_water(glider, found.sea),
     )
 
 
@@ -257,6 +265,28 @@ class _Seas:
         size, sigma = float(fit.size[0]), float(fit.sigma[0])
         return Hypothesis(each.glider, each.fault, each.since, each.dives, size, sigma, ratio, sea)
 
+    def own_water(self, glider: str, sea: Sea) -> float:
+        """Twice the log likelihood ratio, to none, of flow at one glider that no other meets: in the usual
+        sea or this one."""
+        here = np.array([each.glider == glider for each in self._currents])
+        t = np.array([each.end.t for each in self._currents])
+        alike = np.exp(-np.abs(t[:, None] - t) / SEA_MEMORY) * (here[:, None] & here)
+        water = OWN_WATER**2 * np.kron(alike, np.eye(2))
+        found = (self._likelihood(self._covariance_of(each) + water) for each in {self.usual, sea})
+        return 2 * (max(found) - self._plain)
+
+    def _likelihood(self, covariance: Array) -> float:
+        """The log likelihood of the currents with a covariance."""
+        from scipy.linalg import cho_factor, cho_solve  # noqa: PLC0415 (slow; every command loads this module)
+
+        factor = cho_factor(covariance, lower=True, check_finite=False)
+        weighed = cho_solve(factor, self._measured, check_finite=False)
+        return -0.5 * float(self._measured @ weighed) - float(np.log(np.diag(factor[0])).sum())
+
+    def _covariance_of(self, sea: Sea) -> Array:
+        """The covariance of the currents in a sea, their errors included."""
+        return self._covariance.of(sea) + noise(self._currents, sea) + self._healthy
+
     def _best(self, sea: Sea, tried: Sequence[_Candidate]) -> int | None:
         """The place of the likeliest fault in a sea."""
         fit = self._fit(sea, tried)
@@ -271,8 +301,8 @@ class _Seas:
         from scipy.linalg import cho_factor, cho_solve  # noqa: PLC0415 (slow; every command loads this module)
 
         if sea not in self._factors:
-            errors = noise(self._currents, sea) + self._healthy
-            self._factors[sea] = cho_factor(self._covariance.of(sea) + errors, lower=True, check_finite=False)
+            covariance = self._covariance_of(sea)
+            self._factors[sea] = cho_factor(covariance, lower=True, check_finite=False)
         factor = self._factors[sea]
         shapes = np.array([each.shape for each in tried]).reshape(-1, len(self._measured))
         weighed = cho_solve(factor, np.column_stack([self._measured, shapes.T]), check_finite=False)
