@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gliderwatch.health.battery import battery_end
+from gliderwatch.health.leaks import trend
 from gliderwatch.health.readings import History, Readings, joined, of_segment, recent
 from gliderwatch.health.rule import Finding
 from gliderwatch.health.rules import judge, usual_limits
@@ -188,3 +189,54 @@ def test_a_twentieth_of_the_time_is_flown_with_the_thruster(part: float, share: 
     )
     assert end is not None
     assert end.thruster == share
+
+
+# ----------------------------------------------------------------------- slow leak
+
+INHG = 3386.389
+
+
+def falling(files: int, a_day: float) -> History:
+    """Gas density of so many files of which each day has some: the vacuum falls by 2 inHg a week."""
+    t = np.arange(files) / a_day
+    density = ((101325.0 - (8.0 - 2.0 * t / 7.0) * INHG) / 288.0).tolist()
+    return history("gas_density", density[:-1], density[-1:], DAY / a_day)
+
+
+@pytest.mark.parametrize(("days", "is_found"), [(1.375, False), (1.625, True)])
+def test_the_shortest_window_of_a_slow_leak_is_two_days_and_a_half(days: float, is_found: bool) -> None:
+    """Readings have to fill six tenths of it."""
+    assert (found("slow_leak", falling(round(8 * days) + 1, 8.0)) is not None) is is_found
+
+
+@pytest.mark.parametrize(("files", "is_found"), [(10, False), (11, True)])
+def test_a_trend_has_more_than_ten_files(files: int, is_found: bool) -> None:
+    assert (found("slow_leak", falling(files, 5.0)) is not None) is is_found
+
+
+def test_a_trend_is_as_sure_as_three_sigma_in_any_of_three_windows() -> None:
+    """Student's t of 99 independent values, of a chance of 0.00135 / 3."""
+    t = np.arange(100) * HOUR
+    *_, surely = trend(t, np.where(np.arange(100) % 2, 1000.0, -1000.0))
+    assert surely == pytest.approx(3.43, abs=0.02)
+
+
+def test_a_vacuum_without_noise_is_a_hundredth_of_an_inch_off_its_line() -> None:
+    """A fifth of a step of the sensor; of residuals that are none the correlation is 1 / n."""
+    t = np.arange(20) * HOUR
+    _, sigma, _ = trend(t, np.zeros(20))
+    spread = np.sqrt(np.sum((t - t.mean()) ** 2))
+    assert sigma == pytest.approx(0.01 * INHG / spread * ((1 + 1 / 20) / (1 - 1 / 20)) ** 0.5)
+
+
+def test_the_vacuum_falls_as_much_as_it_does_at_one_temperature() -> None:
+    leak = found("slow_leak", falling(14, 8.0))
+    assert leak is not None
+    assert "falls by 2.00 +-" in leak.text
+
+
+def test_gas_density_is_pressure_by_kelvin() -> None:
+    given = readings(
+        vacuum=series([25e3] * 3), vehicle_temperature=series([15.0] * 3), depth=series([9.0] * 3)
+    )
+    assert given["gas_density"].v == pytest.approx((101325.0 - 25e3) / 288.15)
