@@ -37,8 +37,10 @@ OF_THE_SERVICE = {
     "message of another relay left alone",
     "metrics are not served",
     "metrics are served",
+    "not answered",  # the reason names the file, or the state
     "observer died, started again",
     "outbox cannot be read or written",
+    "pages not made anew",  # of all gliders: drawn next time
     "state can be used again",
     "state cannot be used, tried again",
     "stopped",
