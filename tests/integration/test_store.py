@@ -18,7 +18,8 @@ from gliderwatch.errors import GliderwatchError, StateError
 from gliderwatch.incidents.notifications import NotificationState
 from gliderwatch.incidents.overdue import Sign
 from gliderwatch.model import Alert, NextSurfacing, Segment, SegmentId, Series, Unusable, readonly
-from gliderwatch.params import GliderParams
+from gliderwatch.pages.reading import read_glider
+from gliderwatch.params import Attention, GliderParams
 from gliderwatch.pipeline import GliderState, Memory, Outcome
 from gliderwatch.service import routing, transaction
 from gliderwatch.service.routing import Routing, post_alerts
@@ -479,6 +480,12 @@ class TestResults:
         changed = replace(a[2], speed=0.2)
         store.apply("electa", Outcome(GliderState(), 200.0, (changed,), (), None))
         assert store.assessments("electa") == [a[0], a[1], changed]
+
+    def test_a_dive_of_a_clock_that_is_ahead_does_not_hide_the_one_before(self, store):
+        a = [replace(SLOW, t_dive=100.0 * k, t_surface=100.0 * k + 50) for k in range(3)]
+        store.apply("electa", Outcome(GliderState(), float("-inf"), tuple(a), (), None))
+        assert store.facts("electa").latest_dives(1, 200.0) == (a[1],)
+        assert read_glider(store, "electa", Attention(), 200.0, dives=1).latest == a[1]
 
     def test_incidents_opened_later_go(self, store):
         made = [incident(id=f"electa/anomaly/{k}", opened_at=100.0 * k) for k in range(3)]

@@ -67,7 +67,7 @@ def read_glider(
     return GliderView(
         name=name,
         now=now,
-        dives=tuple(dive for dive in known.latest_dives(dives) if dive.t_surface <= now),
+        dives=known.latest_dives(dives, now),
         incidents=tuple(_as_of(i, now) for i in known.incidents() if i.opened_at <= now),
         acks=store.notes.acks(name),
         attention=attention,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterator
+from math import inf
 from pathlib import Path
 
 from gliderwatch.incidents.acknowledgement import Ack, Acks
@@ -121,13 +122,13 @@ class GliderFacts:
         sql = "SELECT data FROM assessments WHERE glider = ? AND t_dive = ?"
         return next(iter(values(self._db, sql, (self.glider, t_dive), Assessment)), None)
 
-    def latest_dives(self, n: int) -> tuple[Assessment, ...]:
-        """The last `n` dives that have ended, in order of time."""
+    def latest_dives(self, n: int, until: float = inf) -> tuple[Assessment, ...]:
+        """The last `n` dives that have ended, not after `until` (s), in order of time."""
         sql = (
-            "SELECT data FROM assessments WHERE glider = ? AND ended = 1 "
+            "SELECT data FROM assessments WHERE glider = ? AND ended = 1 AND t_surface <= ? "
             "ORDER BY t_surface DESC, t_dive DESC LIMIT ?"
         )
-        return tuple(reversed(values(self._db, sql, (self.glider, n), Assessment)))
+        return tuple(reversed(values(self._db, sql, (self.glider, until, n), Assessment)))
 
     def latest_alerts(self, n: int) -> tuple[Alert, ...]:
         """The last `n` messages about it, the newest first."""
