@@ -14,6 +14,7 @@ from pebble import ProcessExpired
 
 from gliderwatch.config import load
 from gliderwatch.model import Segment
+from gliderwatch.service import backlog as backlog_module
 from gliderwatch.service import intake as intake_module
 from gliderwatch.service.daemon import Daemon
 from gliderwatch.service.run import Run, processed_for_another
@@ -73,6 +74,7 @@ class Loop:
         self.daemon, self.runs = Daemon(load(config), config, workers=1), list[int]()
         self.before: Callable[[Run], object] = lambda run: None
         runtime = self.daemon._runtime
+        monkeypatch.setattr(backlog_module, "LONG", 4)
         monkeypatch.setattr(runtime.decoder, "submit", lambda path: done(segments.get, path.name))
         monkeypatch.setattr(runtime.workers_of_runs, "submit", lambda *sent: done(self._processed, *sent))
 

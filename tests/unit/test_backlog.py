@@ -6,7 +6,7 @@ import pytest
 
 from gliderwatch.errors import Quarantine
 from gliderwatch.model import SegmentId
-from gliderwatch.service.backlog import AHEAD, FEWEST, HELD, RUN, Backlog, Job
+from gliderwatch.service.backlog import AHEAD, FEWEST, HELD, LONG, RUN, Backlog, Job
 from gliderwatch.slocum.header import Header
 from gliderwatch.store.state_file import File, Status
 
@@ -23,6 +23,12 @@ def started(backlog: Backlog, n: int) -> list[Job]:
     """The next n files, all being decoded now."""
     jobs = [backlog.next() for _ in range(n)]
     return [job for job in jobs if job is not None]
+
+
+def make_long(backlog: Backlog) -> None:
+    """Let there be so many files that they are taken in runs."""
+    for opened_at in range(LONG):
+        backlog.add(job("of another", opened_at))
 
 
 def test_files_of_a_glider_are_decoded_oldest_first() -> None:
@@ -49,6 +55,7 @@ def test_a_run_waits_for_its_files_and_is_taken_by_none_else() -> None:
     for opened_at in range(RUN + 1):
         backlog.add(job("a", opened_at))
     begun = started(backlog, RUN + 1)
+    make_long(backlog)
     for one in begun[: RUN - 1]:
         backlog.finish(one, DONE)
     assert backlog.ready("a") == []
@@ -61,11 +68,36 @@ def test_a_run_waits_for_its_files_and_is_taken_by_none_else() -> None:
     assert [backlog.decoded("a") for _ in begun] == begun
 
 
+def test_a_list_that_is_short_is_taken_file_by_file() -> None:
+    """Until it is long, and again after nothing was at hand."""
+    backlog, files = Backlog(), range(LONG - 1)
+    for opened_at in files:
+        backlog.add(job("a", opened_at))
+    begun = started(backlog, RUN)
+    for one in begun:
+        backlog.finish(one, DONE)
+    assert backlog.ready("a") == begun[:1]
+    backlog.add(job("b", 1.0))
+    assert backlog.ready("a") == begun
+    while (more := backlog.next()) is not None:
+        backlog.finish(more, DONE)
+        while backlog.decoded("a") or backlog.decoded("b"):
+            pass
+    assert not len(backlog)
+    for opened_at in range(3):
+        backlog.add(job("c", opened_at))
+    begun = started(backlog, 3)
+    for one in begun:
+        backlog.finish(one, DONE)
+    assert backlog.ready("c") == begun[:1]
+
+
 def test_few_files_do_not_wait_for_each_other() -> None:
     backlog = Backlog()
     for opened_at in range(FEWEST - 1):
         backlog.add(job("a", opened_at))
     first, *_ = started(backlog, 9)
+    make_long(backlog)
     backlog.finish(first, DONE)
     assert backlog.ready("a") == [first]
 

@@ -18,6 +18,9 @@ class Backlog:
     One glider with a month of files delays no other: one that had none at hand is next. A file that takes
     long to decode delays its own glider alone. ``decoding`` counts the files that are being decoded,
     ``running`` the runs that are being processed.
+
+    Files are taken in runs once `LONG` of them are at hand, until none is: for fewer it takes longer to begin
+    the processes that do it.
     """
 
     def __init__(self) -> None:
@@ -25,6 +28,7 @@ class Backlog:
         self._new: dict[str, None] = {}
         self._paths: set[str] = set()
         self.decoding = self.running = self._held = 0
+        self._is_long = False
 
     def __len__(self) -> int:
         return len(self._paths)
@@ -34,6 +38,7 @@ class Backlog:
         if job.file.path in self._paths:
             return
         self._paths.add(job.file.path)
+        self._is_long |= len(self._paths) >= LONG
         glider = job.header.id.glider
         if glider not in self._queues:  # a file that just came does not wait for a round of all gliders
             self._queues[glider] = _Queue()
@@ -76,19 +81,21 @@ class Backlog:
         job = queue.decoding.popleft()
         self._held -= 1
         self._paths.discard(job.file.path)
+        self._is_long &= bool(self._paths)
         if not queue.waiting and not queue.decoding:
             del self._queues[glider]
         return job
 
     def ready(self, glider: str) -> list[Job]:
-        """The next files of a glider to take that are decoded, as many as may make a run; none while one is
-        being processed, or while more files are on their way to be in it."""
+        """The next files of a glider to take that are decoded, as many as may make a run, one where the list
+        is short; none while a run is being processed, or while more files are on their way to be in it."""
         queue = self._queues.get(glider)
         if queue is None or queue.in_run:
             return []
-        found = list(islice(takewhile(lambda job: job.result is not None, queue.decoding), RUN))
+        most = RUN if self._is_long else 1
+        found = list(islice(takewhile(lambda job: job.result is not None, queue.decoding), most))
         more = self.behind(glider) > len(found)
-        if len(found) < RUN and more and self.behind(glider) >= FEWEST and not self.is_full:
+        if len(found) < most and more and self.behind(glider) >= FEWEST and not self.is_full:
             return []
         return found
 
@@ -146,6 +153,9 @@ class _Queue:
 
 RUN = 16
 """Files of one glider that are decoded before another has its turn, and that a worker processes at once."""
+LONG = 100
+"""Files at hand from which on they are taken in runs: some 10 ms of work each, and about a second until the
+processes that do it have begun."""
 FEWEST = 4
 """Files of a glider at hand from which on they are taken in runs; fewer are taken as each is decoded."""
 HELD = 8 * RUN
