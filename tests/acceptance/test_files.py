@@ -266,13 +266,13 @@ def test_damaged_files_never_end_it(site: Site, daemon: Daemon) -> None:
 
 
 POISON = """
-from gliderwatch.service import transaction
-good = transaction.process
+from gliderwatch.service import run
+good = run.process
 def process(state, segment, *rest):
     if segment.id.name.endswith("-3"):
         raise ZeroDivisionError("unforeseen")
     return good(state, segment, *rest)
-transaction.process = process
+run.process = process
 from gliderwatch.cli.main import main
 main()
 """

@@ -208,16 +208,17 @@ def test_a_score_that_is_stopped_says_so_without_a_traceback(tmp_path: Path) -> 
 STOPPED_AT_THE_THIRD_TASK = """
 import os, signal
 from gliderwatch.cli.main import main
-from gliderwatch.score import work
+from distributed import Client
 
-class Pool(work.ProcessPoolExecutor):
-    def submit(self, *args, given=[]):
+class Hands(Client):
+    def submit(self, *args, given=[], **named):
         given.append(args)
         if len(given) == 3:
             os.kill(os.getpid(), signal.SIGINT)
-        return super().submit(*args)
+        return super().submit(*args, **named)
 
-work.ProcessPoolExecutor = Pool
+import distributed
+distributed.Client = Hands
 main(["score", "--out", "out"])
 """
 

@@ -367,9 +367,9 @@ class TestDaily:
 
 
 def test_said_of_a_glider_without_incidents_is_left_alone(store):
-    said = NotificationState(surfaced=5.0)
     with store.transaction():
         post_alerts(store, "unit", replace(store.notified("unit"), surfaced=5.0), (), lambda alert: (), 0.0)
+    said = NotificationState(surfaced=5.0, neighbours=store.notified("unit").neighbours)
     clear(store)
     assert store.notified("unit") == said
 
