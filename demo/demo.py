@@ -36,7 +36,7 @@ SPEEDUP = 12000
 """Three days of the gliders' lives in about twenty seconds."""
 FLEET = ("--gliders", "2", "--days", "3", "--fault", "remora:8@2", "--seed", "4")
 PATIENCE = 30.0
-DAY = 86400.0
+DAY, DIVE = 86400.0, 3 * 3600.0
 LINE = 0.05
 """Seconds from line to line of a log."""
 GLIDERWATCH = Path(sys.executable).with_name("gliderwatch")
@@ -92,7 +92,8 @@ def free_port() -> int:
 
 def play(dockserver: Path, console: Console) -> None:
     """Let a simulated fleet send its files as time passes, and show them as they come."""
-    began = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(time.time() - 3 * DAY))  # its last file is of now
+    # The dive in which the third day ends takes some three hours more: no file is of a time to come.
+    began = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(time.time() - 3 * DAY - DIVE))
     scenario = dockserver / "scenario.yml"
     scenario.write_text(f"about: A demo.\nstart: {began}\nsurface_segments: true\n")
     command = [GLIDERWATCH, "simulate", dockserver, "--scenario", scenario, *FLEET]
