@@ -84,6 +84,11 @@ class GliderParams:
     learner: LearnerParams = field(default_factory=LearnerParams)
     rules: RuleParams = field(default_factory=RuleParams)
 
+    @property
+    def compares_own_current(self) -> bool:
+        """Whether a dive is compared with the current that the glider itself measured."""
+        return self.reference in ("dac", "fleet")
+
 
 @dataclass(frozen=True, slots=True)
 class Attention:

@@ -30,6 +30,18 @@ def science(name: str = NAME, n: int = 40, sensors: tuple[tuple[str, int, str], 
     return head + dinkum.cycles(rows, sensors)
 
 
+def with_own(station: Path, sensor: str, unit: str, first: float) -> bytes:
+    """A science file that measures one sensor more, whose value grows by 1 a cycle from the first; its cache
+    file is put beside the station's."""
+    wanted = (*SCIENCE, (sensor, 4, unit))
+    rows = [
+        {SCIENCE[0][0]: dinkum.OPENED_AT + 90.0 * i, SCIENCE[1][0]: 1.0, sensor: first + i} for i in range(20)
+    ]
+    (station.parent / f"{OTHER}.cac").write_bytes(dinkum.sensor_list(wanted, OTHER))
+    head = dinkum.header(NAME, crc=OTHER, n_held=3, filename_extension="tbd")
+    return head + dinkum.cycles(rows, wanted)
+
+
 @pytest.fixture
 def station(tmp_path: Path) -> Path:
     """A folder with a flight file without depth, and the cache files of it and of its science file."""
@@ -108,19 +120,9 @@ def test_a_depth_that_is_there_is_kept(station: Path) -> None:
 
 
 def test_what_the_science_file_measures_is_read_where_a_field_is_made_of_it(station: Path) -> None:
-    wanted = (*SCIENCE, ("sci_water_temp", 4, "degc"))
-    rows = [
-        {
-            "sci_m_present_time": dinkum.OPENED_AT + 90.0 * i,
-            "sci_water_pressure": 1.0,
-            "sci_water_temp": 9.0 + i,
-        }
-        for i in range(20)
-    ]
-    (station.parent / f"{OTHER}.cac").write_bytes(dinkum.sensor_list(wanted, OTHER))
-    head = dinkum.header(NAME, crc=OTHER, n_held=3, filename_extension="tbd")
+    content = with_own(station, "sci_water_temp", "degc", 9.0)
     before = decode(station, [station.parent], science=())
-    station.with_suffix(".tbd").write_bytes(head + dinkum.cycles(rows, wanted))
+    station.with_suffix(".tbd").write_bytes(content)
     plain, whole = decode(station, [station.parent]), decode(station, [station.parent], science=())
     assert "temperature" not in plain.quantities
     assert whole.get("temperature").v == pytest.approx(9.0 + np.arange(1, 20), abs=1e-4)
@@ -129,18 +131,8 @@ def test_what_the_science_file_measures_is_read_where_a_field_is_made_of_it(stat
 
 
 def test_a_sensor_of_the_science_computer_is_read_by_its_name(station: Path) -> None:
-    wanted = (*SCIENCE, ("sci_flbbcd_chlor_units", 4, "ug/l"))
-    rows = [
-        {
-            "sci_m_present_time": dinkum.OPENED_AT + 90.0 * i,
-            "sci_water_pressure": 1.0,
-            "sci_flbbcd_chlor_units": 0.5 + i,
-        }
-        for i in range(20)
-    ]
-    (station.parent / f"{OTHER}.cac").write_bytes(dinkum.sensor_list(wanted, OTHER))
-    head = dinkum.header(NAME, crc=OTHER, n_held=3, filename_extension="tbd")
-    station.with_suffix(".tbd").write_bytes(head + dinkum.cycles(rows, wanted))
+    content = with_own(station, "sci_flbbcd_chlor_units", "ug/l", 0.5)
+    station.with_suffix(".tbd").write_bytes(content)
     plain = decode(station, [station.parent], science=())
     whole = decode(station, [station.parent], science=("sci_flbbcd_chlor_units", "sci_not_sent"))
     assert set(whole.quantities) - set(plain.quantities) == {"sci_flbbcd_chlor_units"}

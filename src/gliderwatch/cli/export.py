@@ -146,8 +146,8 @@ def export(
             _write_netcdf(out, form, store, views[0], config.export.attributes if config is not None else {})
             return
         if form == "csv":
-            fleet = _fleet(store)
-            text = dives.as_csv([d for view in views for d in beside_neighbours(view.dives, fleet)])
+            every = [dive for view in views for dive in view.dives]
+            text = dives.as_csv(beside_neighbours(every, _fleet(store)))
         else:
             text = maps.as_geojson(views) if form == "geojson" else maps.as_kml(views)
     if out is None:

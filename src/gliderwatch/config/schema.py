@@ -266,7 +266,7 @@ class Layers(Section):
 
     @field_validator("sensor")
     @classmethod
-    def _is_known(cls, sensor: str) -> str:
+    def _is_a_sensor(cls, sensor: str) -> str:
         if sensor not in ("temperature", "salinity", "density", "oxygen") and not sensor.startswith("sci_"):
             raise ValueError("is temperature, salinity, density, oxygen, or a name that begins with sci_")
         return sensor

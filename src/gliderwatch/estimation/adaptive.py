@@ -190,10 +190,10 @@ def _judged(
     reason, verdict = "", None
     if state.warm < warm_up(params):
         reason = "warming up"
-    elif reference is None and state.maxima.reference > 0.0 and params.reference in ("dac", "fleet"):
+    elif reference is None and state.maxima.reference > 0.0 and params.compares_own_current:
         reason = "no depth-averaged current"
     else:
-        if reference is None and params.reference in ("dac", "fleet"):
+        if reference is None and params.compares_own_current:
             notes.append("no depth-averaged current in the files: a wrong flow cannot be told")
         verdict = flag(error or 0.0, params.gamma_f, info.speed, params.speed_min, params.speed_max)
         reason = _why(verdict, info.speed, params)

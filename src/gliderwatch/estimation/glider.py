@@ -187,7 +187,7 @@ def step(
 
 def _reference(state: Estimate, dive: Dive, params: GliderParams, ocean: Field | None) -> Reference | None:
     """What a dive is compared with; None: its own current."""
-    if params.reference in ("dac", "fleet") or dive.start is None or dive.end is None:
+    if params.compares_own_current or dive.start is None or dive.end is None:
         return None
     if params.reference == "model":
         return of_model(ocean, dive, dive.start, dive.end)

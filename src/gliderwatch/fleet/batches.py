@@ -36,6 +36,11 @@ class Where:
     lon: Array
 
 
+def property_of(sensor: Sensor) -> str:
+    """What a sensor measures, as people and files call it."""
+    return "temperature" if sensor == "sci_water_temp" else sensor
+
+
 def params_of(sensor: Sensor, estimator: Estimator) -> FieldParams:
     """How a field of a sensor behaves, by `SENSORS_OF_FIELDS`."""
     deviation, mean, spread = SENSORS_OF_FIELDS[sensor]

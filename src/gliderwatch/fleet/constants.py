@@ -145,4 +145,5 @@ MOST_ONE_WAY = 0.5
 """Length of the mean course of a fleet above which an error that all share is not told from a current: all go
 one way. With a front, eight sound gliders on one course had a ratio above 40."""
 MOST_CURRENTS = 200
-"""Currents that are taken at most, the nearest in space and time: the rest would only cost time."""
+"""Currents that are taken at most: for the flow the nearest in space and time, for a comparison the latest.
+The rest would only cost time."""

@@ -92,9 +92,9 @@ def _row_lengths(values: Array, least: float) -> list[int]:
     lowest, highest = np.minimum.accumulate(values), np.maximum.accumulate(values)
     n = np.arange(2, len(values) - USUAL_FILES + 1)
     head = len(values) - n - 1
-    above = np.minimum.accumulate(ends)[n - 1] - lowest[head] > least
-    below = highest[head] - np.maximum.accumulate(ends)[n - 1] > least
-    return [int(each) for each in n[above | below][::-1]]
+    risen = np.minimum.accumulate(ends)[n - 1] - lowest[head] > least
+    fallen = highest[head] - np.maximum.accumulate(ends)[n - 1] > least
+    return [int(each) for each in n[risen | fallen][::-1]]
 
 
 ALTITUDE = Rule(

@@ -1,5 +1,5 @@
-"""The page of a field of the sea: what the gliders know of it together, and how well. Only `read_fields`
-touches the state file."""
+"""The page of a field of the sea: what the gliders know of it together, and how well. Only `fields_of`
+and `read_field` touch the state file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from gliderwatch.figures.field_svg import FieldPanel, Spot
 from gliderwatch.figures.section_svg import UNITS
 from gliderwatch.fleet.advice import Box
-from gliderwatch.fleet.batches import Sensor
+from gliderwatch.fleet.batches import Sensor, property_of
 from gliderwatch.fleet.constants import BIN, NO_MORE_AT_SEA
 from gliderwatch.fleet.scalar_field import FieldParams, Information, at, estimate
 from gliderwatch.messages.formatting import clean, utc
@@ -71,7 +71,7 @@ def read_field(store: Store, name: str, now: float) -> FieldView | None:
     deep = _grid(known, params, across, np.array([part]), down)
     return FieldView(
         name=clean(name, 40),
-        sensor="temperature" if sensor == "sci_water_temp" else sensor,
+        sensor=property_of(sensor),
         box=box,
         now=now,
         last=min(extent[2], now),

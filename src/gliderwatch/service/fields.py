@@ -16,7 +16,7 @@ from gliderwatch.config import Config
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.export.properties import PROPERTIES
 from gliderwatch.fleet.advice import Advice, Bounds, Box, Leg, Point, Way, advise, with_planned
-from gliderwatch.fleet.batches import Sensor, batch_of, params_of, whereabouts
+from gliderwatch.fleet.batches import Sensor, batch_of, params_of, property_of, whereabouts
 from gliderwatch.fleet.constants import BIN, NO_MORE_AT_SEA, USUAL_LEG
 from gliderwatch.fleet.scalar_field import Batch, Checkpoint, FieldParams, at, estimate
 from gliderwatch.forecast.outlook import look_ahead
@@ -266,7 +266,7 @@ def _fill(
         about = {"long_name": f"{name} of the field", "coverage_content_type": "coordinate"}
         variable.setncatts(attributes | about)
         variable[:] = points
-    name = "temperature" if field.sensor == "sci_water_temp" else field.sensor
+    name = property_of(field.sensor)
     unit, standard = PROPERTIES[name]
     shape = (1, *(len(axis) for axis in axes))
     for each, suffix, modifier in zip(values, ("", "_error"), ("", " standard_error"), strict=True):

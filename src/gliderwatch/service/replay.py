@@ -9,6 +9,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 
 from gliderwatch.config import Config, expand
@@ -386,7 +387,7 @@ def _count(
 
 
 def _write(out: Path, store: Store) -> None:
-    dives = {glider: store.assessments(glider) for glider in store.gliders()}
-    seen = (a for own in dives.values() for a in beside_neighbours(own, dives.values()))
+    fleet = [store.assessments(glider) for glider in store.gliders()]
+    seen = beside_neighbours(chain.from_iterable(fleet), fleet)
     write_lines(out / ASSESSMENTS, map(assessment_line, seen))
     write_lines(out / ALERTS, (alert_line(a) for a in store.alerts()))

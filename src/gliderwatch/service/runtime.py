@@ -186,6 +186,19 @@ def _send_alike(before: Runtime, config: Config, channels: dict[str, Channel]) -
     )
 
 
+def _sending(
+    config: Config, wake: threading.Event, before: Runtime | None
+) -> tuple[Dispatcher, dict[str, Channel], MailPictures]:
+    """What sends messages, by which channels and with which pictures; those before, where they are alike."""
+    state = Path(config.state.path)
+    pictures = MailPictures(state, config.attention, time.time, config.maps.files)
+    channels = {name: config.channel(name, pictures) for name in config.channels}
+    if before is not None and _send_alike(before, config, channels):
+        before.pictures.attention = config.attention
+        return before.dispatcher, before.channels, before.pictures
+    return _dispatcher(config, channels, state, wake), channels, pictures
+
+
 def _dispatcher(
     config: Config, channels: dict[str, Channel], state: Path, wake: threading.Event
 ) -> Dispatcher:
@@ -211,14 +224,7 @@ def build(
     configuration is read again is then not sent a second time. Their decoder goes on always, with its worker
     processes.
     """
-    state = Path(config.state.path)
-    pictures = MailPictures(state, config.attention, time.time, config.maps.files)
-    channels = {name: config.channel(name, pictures) for name in config.channels}
-    if before is not None and _send_alike(before, config, channels):
-        dispatcher, channels, pictures = before.dispatcher, before.channels, before.pictures
-        pictures.attention = config.attention
-    else:
-        dispatcher = _dispatcher(config, channels, state, wake)
+    dispatcher, channels, pictures = _sending(config, wake, before)
     watcher = Watcher(
         config.dockserver.roots,
         {name: glider.paths for name, glider in config.gliders.items()},

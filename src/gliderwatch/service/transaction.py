@@ -91,10 +91,8 @@ def process_file(
         assessments, state = _keep(store, _place(store, segment), segment, done, layers)
         if fields:
             fields_of_sea.add(store, fields, store.segments.kept(segment.id))
-        advice = look(store, fields, glider, state) if fields and routing is not None else ()
-        alerts = _due_messages(store, glider, params, routing, now)
-        deep = layers_of_sea.newest(store, glider) if layers is not None and routing is not None else None
-        return FileOutcome(file, assessments, alerts, advice, deep)
+        outcome = FileOutcome(file, assessments)
+        return _with_news(store, glider, outcome, state, params, routing, now, fields, layers)
 
     with store.guarded():
         run = _foreseen(store, segment)
@@ -132,7 +130,6 @@ def process_run(
     """Commit a run (`foreseen`) that was processed elsewhere, in one transaction; its last file has the
     messages. None, and nothing is written, where by now another one is to be processed.
     """
-    glider = files[0][1].id.glider
     taken = [replace(file, status=Status.TAKEN, reason="") for file, _ in files]
     try:
         with store.transaction():
@@ -143,14 +140,31 @@ def process_run(
             _, state = _keep(store, min(firsts), None, done, layers)
             for _, segment in files if fields else ():
                 fields_of_sea.add(store, fields, store.segments.kept(segment.id))
-            advice = look(store, fields, glider, state) if fields and routing is not None else ()
-            alerts = _due_messages(store, glider, params, routing, now)
-            asked = layers is not None and routing is not None
-            deep = layers_of_sea.newest(store, glider) if asked else None
+            found = [FileOutcome(f, o.assessments) for f, o in zip(taken, done.outcomes, strict=True)]
+            glider = files[-1][1].id.glider
+            last = _with_news(store, glider, found[-1], state, params, routing, now, fields, layers)
     except _ToProcessError:
         return None
-    found = [FileOutcome(f, o.assessments) for f, o in zip(taken, done.outcomes, strict=True)]
-    return (*found[:-1], replace(found[-1], alerts=alerts, advice=advice, layers=deep))
+    return (*found[:-1], last)
+
+
+def _with_news(
+    store: Store,
+    glider: str,
+    outcome: FileOutcome,
+    state: GliderState,
+    params: GliderParams,
+    routing: Routing | None,
+    now: float,
+    fields: Sequence[FleetField],
+    layers: GliderLayers | None,
+) -> FileOutcome:
+    """The outcome of the last file at hand of a glider with the messages that are due, and what is advised;
+    where `routing` is None, of one before it, without."""
+    advice = look(store, fields, glider, state) if fields and routing is not None else ()
+    alerts = _due_messages(store, glider, params, routing, now)
+    deep = layers_of_sea.newest(store, glider) if layers is not None and routing is not None else None
+    return replace(outcome, alerts=alerts, advice=advice, layers=deep)
 
 
 def record_file(
@@ -402,7 +416,7 @@ def _due_messages(
     found = Findings(judged)
     if surfacings:
         found = _with_advice(store, glider, found)
-    if attention.neighbours and params.reference in ("dac", "fleet"):
+    if attention.neighbours and params.compares_own_current:
         found = replace(found, currents=_currents(store, glider, before))
     what = due(before, facts, wanted, found, now)
     alerts = tuple(map(_rendered, what.notices))

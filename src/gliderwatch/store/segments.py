@@ -496,9 +496,10 @@ class Segments:
             (record, *key),
         )
         self._db.execute("DELETE FROM expected WHERE glider = ? AND opened_at = ? AND segment = ?", key)
-        if (e := expected) is not None:
-            row = (identity.glider, identity.name, identity.opened_at, e.after, codec.plain_encode(e))
-            self._db.execute("INSERT INTO expected VALUES (?, ?, ?, ?, ?)", row)
+        if expected is not None:
+            row = (identity.glider, identity.name, identity.opened_at, expected.after)
+            data = codec.plain_encode(expected)
+            self._db.execute("INSERT INTO expected VALUES (?, ?, ?, ?, ?)", (*row, data))
 
     def last_surfacing(self, glider: str) -> float:
         """The last surfacing (s) that the expected one rests upon, by its files; -inf before any."""

@@ -139,17 +139,21 @@ class Site:
 
     async def page(self, file: str) -> LivePage:
         """A page. Raises KeyError where there is none of that name, GliderwatchError."""
-        await self.job(file)
+        await self.shown()
         if file not in self._marks:
             raise KeyError(file)
         return self.pages.held(file) or await self.pages.get(file)
 
     async def job(self, file: str) -> LiveJob:
         """What the page of a file is made from. Raises GliderwatchError."""
+        return LiveJob(await self.shown(), file, self._warning())
+
+    async def shown(self) -> Shown:
+        """What is shown, read where it was not yet. Raises GliderwatchError."""
         if self._shown is None:
             await self.read()
         assert self._shown is not None
-        return LiveJob(self._shown, file, self._warning())
+        return self._shown
 
     async def read(self) -> None:
         """See what is new, by page. Raises GliderwatchError."""
