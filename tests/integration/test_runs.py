@@ -155,3 +155,19 @@ def test_of_a_run_one_file_that_cannot_be_processed_is_left_out_alone(loop: Loop
     assert loop.take_all() == one_by_one(loop, but=5)
     (file,) = loop.daemon._store.files(Status.QUARANTINED)
     assert file.path == str(loop.paths[5]) and "took longer than" in file.reason
+
+
+def test_an_unmute_that_is_written_after_the_look_at_its_time_is_seen(
+    loop: Loop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The command had to wait for the state file."""
+    now, store, intake, seen = time.time(), loop.daemon._store, loop.daemon._intake, list[str]()
+    monkeypatch.setattr(intake, "_notify_if_last", seen.append)
+    with store.transaction():
+        store.notes.mute("unit", now + 7200.0, now - 60.0)
+    intake.notify_unmuted(now + 1.0)
+    assert seen == []
+    with store.transaction():
+        store.notes.unmute("unit", now - 10.0)
+    intake.notify_unmuted(now + 2.0)
+    assert seen == ["unit"]

@@ -42,6 +42,9 @@ QUIET = 10.0
 that come at once only all together show when it called."""
 LONGEST = 120.0
 """Seconds after which that is reported in any case."""
+WRITTEN = 60.0
+"""Seconds that the command `unmute` may take from when it reads the clock until what it wrote is seen: it
+waits half of it for the state file."""
 
 
 class Intake:
@@ -481,12 +484,13 @@ class Intake:
         return glider not in self._returned
 
     def notify_unmuted(self, now: float) -> None:
-        """Send what is due of gliders whose mute has ended since the last time, by `now` (s)."""
+        """Send what is due of gliders whose mute has ended since the last time, by `now` (s), or by a command
+        a while before; what was sent is not due again."""
         since, self._unmuted_until = self._unmuted_until, now
         attention = self._runtime.routing.attention
         ends = {glider: attention(glider).muted_until for glider in self._runtime.config.gliders}
         over = {glider for glider, end in ends.items() if end is not None and since < end <= now}
-        for glider in sorted(over | set(self._store.notes.unmuted(since, now))):
+        for glider in sorted(over | set(self._store.notes.unmuted(since - WRITTEN, now))):
             self._notify_if_last(glider)
 
     def _notify_if_last(self, glider: str) -> None:
