@@ -32,6 +32,13 @@ def test_simulate_says_whether_layers_that_jumped_were_found_again(tmp_path: Pat
     assert found["coverage_at_end"] > 0.99
 
 
+@pytest.mark.parametrize("jump", ["nan", "inf", "1e9", "deep"])
+def test_a_jump_that_cannot_be_is_refused_in_words(jump: str, tmp_path: Path) -> None:
+    result = run("simulate", "--jump", jump, "--out", tmp_path)
+    assert result.exit_code == 2
+    assert "Invalid value for '--jump'" in result.output
+
+
 @pytest.mark.real
 def test_replay_compares_the_methods(shared_data: Path) -> None:
     mission = shared_data / "usf-sam-2019"

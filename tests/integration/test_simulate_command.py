@@ -145,6 +145,8 @@ def test_files_carry_the_time_of_the_glider(tmp_path: Path) -> None:
         (("--fault", "shark_strik:1@2"), "did you mean `shark_strike`?"),
         (("--fault", "net:3@2"), "the part of all motion that is lost, 0 to 0.98"),
         (("--gliders", 0), "1<=x<=100"),
+        (("--days", "nan"), "nan is not a number with an end"),
+        (("--days", 0.3, "--live", "--speedup", "nan"), "nan is not a number with an end"),
         (("--days", 0.3, "--scenario", "steep.yml"), "cannot fly this scenario"),
     ],
 )

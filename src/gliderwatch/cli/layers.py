@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gliderwatch.cli.options import Number
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.model import Segment, SegmentId
 
@@ -35,7 +36,9 @@ def layers() -> None:
 @click.option("--preset", "name", type=click.Choice(["simulation", "field"]), default="simulation")
 @click.option("--seed", type=click.IntRange(0), default=0, help="Chance of its own for each seed (0).")
 @click.option(
-    "--jump", type=float, help="At its end the layers jump down by so many m, and it goes on 3000 s."
+    "--jump",
+    type=Number(-50, 50),
+    help="At its end the layers jump down by so many m, and it goes on 3000 s.",
 )
 @click.option(
     "--out",

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 from rich.console import Console
@@ -70,6 +71,17 @@ def example(*lines: str) -> str:
     return "\b\n" + "\n".join(
         ["Example:" if len(lines) == 1 else "Examples:", *(f"  {line}" for line in lines)]
     )
+
+
+class Number(click.FloatRange):
+    """A number in a range. That of click lets NaN pass, which is in none."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The number. Raises click.BadParameter for what is none in the range."""
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a number with an end.", param, ctx)
+        return number
 
 
 def progress() -> Progress:

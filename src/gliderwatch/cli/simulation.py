@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gliderwatch.cli.options import cluster_option, example, progress, workers_option
+from gliderwatch.cli.options import Number, cluster_option, example, progress, workers_option
 from gliderwatch.errors import GliderwatchError
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @click.argument("out", type=click.Path(file_okay=False, path_type=Path))
 @click.option("--scenario", "name", default="calm", help="A shipped scenario, or a YAML file (calm).")
 @click.option("--gliders", type=click.IntRange(1, 100), default=1, help="How many gliders fly (1).")
-@click.option("--days", type=click.FloatRange(0.01, 366), help="How long they fly.")
+@click.option("--days", type=Number(0.01, 366), help="How long they fly.")
 @click.option(
     "--fault",
     "faults",
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     help="Of the last glider, as slow_leak:0.5@3, battery:6@5 or device_error@2.",
 )
 @click.option("--live", is_flag=True, help="Let the files come as time passes; OUT may be in use.")
-@click.option("--speedup", type=click.FloatRange(0, min_open=True), help="With --live: how much faster (1).")
+@click.option("--speedup", type=Number(0, min_open=True), help="With --live: how much faster (1).")
 @click.option("--relays", type=click.IntRange(1, 100), default=1, help="Dockservers that they call (1).")
 @click.option(
     "--outage",
