@@ -19,7 +19,7 @@ from gliderwatch.errors import GliderwatchError
 from gliderwatch.layers import flown
 from gliderwatch.layers.advice import LayerParams, after
 from gliderwatch.layers.band import Method, Tracking
-from gliderwatch.layers.water import casts_of
+from gliderwatch.layers.casts import casts_of
 from gliderwatch.model import Segment
 from gliderwatch.slocum import folders
 from gliderwatch.slocum.decode import decode_science

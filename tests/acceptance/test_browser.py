@@ -22,8 +22,7 @@ import pytest
 from gliderwatch.figures.coast import world
 from gliderwatch.messages.samples import SAMPLES
 from gliderwatch.model import Kind
-from gliderwatch.pages.guide import guide_page
-from gliderwatch.pages.render import Frame, field_page, fleet_page, glider_page, sheet_page
+from gliderwatch.pages.render import Frame, field_page, fleet_page, glider_page, guide_page, sheet_page
 from gliderwatch.pages.view import GliderView
 from unit.test_field_page import view as field_view
 from unit.test_pages import LATE, NOW, aborted, incident, view

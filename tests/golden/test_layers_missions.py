@@ -9,7 +9,7 @@ import pytest
 
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.layers import flown
-from gliderwatch.layers.water import casts_of
+from gliderwatch.layers.casts import casts_of
 from gliderwatch.model import Segment
 from gliderwatch.slocum import folders
 from gliderwatch.slocum.decode import decode_science

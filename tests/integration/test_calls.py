@@ -17,7 +17,7 @@ from gliderwatch.model import Alert, Kind, SegmentId, Severity
 from gliderwatch.params import GliderParams
 from gliderwatch.service import judgement, transaction
 from gliderwatch.service.replay import Request, replay
-from gliderwatch.service.replay_of_nothing import unassessed
+from gliderwatch.service.replay_files import unassessed
 from gliderwatch.service.routing import Routing
 from gliderwatch.store.state_file import Status, Store
 

@@ -30,8 +30,7 @@ from gliderwatch.model import Alert, Assessment, Incident, Kind, Segment, Segmen
 from gliderwatch.pipeline import GliderState, Outcome
 from gliderwatch.store.state_file import Store
 from gliderwatch.web import app, live
-from gliderwatch.web.cache import PageCache
-from gliderwatch.web.live import LivePage
+from gliderwatch.web.live import LivePage, PageCache
 from unit.test_pages import HOSTILE, NOW, dive, incident
 
 NAMES = ("bruce", "electa")

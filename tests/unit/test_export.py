@@ -15,7 +15,7 @@ from compliance_checker.runner import CheckSuite, ComplianceChecker
 from pyais import decode
 
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.export import ais, dives, maps, netcdf, sections
+from gliderwatch.export import ais, dives, maps, netcdf
 from gliderwatch.incidents.notices import DriftEllipse
 from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.layers.band import Band, Mode
@@ -156,7 +156,7 @@ def test_a_section_with_its_layers_is_read_back_and_passes_the_checker(tmp_path)
     value[1, -1] = np.nan
     t = np.array([dives[0].t_surface, dives[-1].t_surface])
     advice = [advised(Band(3.0, 10.0)), advised(None)]
-    sections.write(tmp_path / "x.nc", "electa", Section(t, edges, value), advice, dives, NOW)
+    netcdf.write_section(tmp_path / "x.nc", "electa", Section(t, edges, value), advice, dives, NOW)
     with xr.open_dataset(tmp_path / "x.nc") as data:
         assert np.isnan(data.temperature.values[1, -1])
         assert data.temperature.values[0] == pytest.approx(value[0])
@@ -165,7 +165,7 @@ def test_a_section_with_its_layers_is_read_back_and_passes_the_checker(tmp_path)
         assert float(data.lat[0]) == pytest.approx(dives[0].lat)
     assert remarks(tmp_path / "x.nc", "cf:1.8") == {"high": [], "medium": [], "low": []}
     with pytest.raises(GliderwatchError, match="no layers with a position"):
-        sections.write(tmp_path / "x.nc", "electa", Section(t[:0], edges, value[:0]), [], dives, NOW)
+        netcdf.write_section(tmp_path / "x.nc", "electa", Section(t[:0], edges, value[:0]), [], dives, NOW)
 
 
 def test_a_glider_without_a_place_has_no_trajectory(tmp_path):

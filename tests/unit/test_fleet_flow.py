@@ -8,7 +8,7 @@ import pytest
 from gliderwatch.fleet.flow import DiveCurrent, Dives, FlowCovariance, Sea, dives_between, fleet_flow
 from gliderwatch.model import Fix
 from gliderwatch.navigation.geodesy import from_plane
-from gliderwatch.papers.fleet_flow import SPREAD, basis
+from streamfunction import SPREAD, basis
 
 T0, HOUR = 1.7e9, 3600.0
 AXIS = np.linspace(0, 1, 7)

@@ -9,7 +9,7 @@ import pytest
 from gliderwatch.delivery.links import Linked
 from gliderwatch.messages.guide import SECTIONS, anchor
 from gliderwatch.model import Alert, Kind
-from gliderwatch.pages.guide import guide_page
+from gliderwatch.pages.render import guide_page
 from message_kinds import kinds
 
 KINDS = kinds()

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pytest
 
-from gliderwatch.config.health import Health, limits_of
+from gliderwatch.config.fields import Health, limits_of
 from gliderwatch.health.battery import battery_end, without_resets
 from gliderwatch.health.leaks import trend
 from gliderwatch.health.readings import History, of_call, of_segment, recent

@@ -15,7 +15,7 @@ from gliderwatch.figures.plots import Line, Panel
 from gliderwatch.figures.timeline import Bar
 from gliderwatch.health.battery import End
 from gliderwatch.model import Call, Series, readonly
-from gliderwatch.pages.call_log import call_log
+from gliderwatch.pages.facts import call_log
 from unit.test_figures import some_dives
 
 DAY = 86400.0

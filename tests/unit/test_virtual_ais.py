@@ -9,7 +9,7 @@ from pyais import decode
 from structlog.testing import capture_logs
 
 from gliderwatch.config import load
-from gliderwatch.service.virtual_ais import VirtualAis
+from gliderwatch.export.ais import VirtualAis
 from gliderwatch.store.state_file import Store
 from integration.test_web import keep
 from unit.test_pages import NOW, dive

@@ -164,7 +164,7 @@ def _fleet(store: Store) -> list[list[Assessment]]:
 def _write_netcdf(
     out: Path, form: str, store: Store, view: GliderView, attributes: Mapping[str, str]
 ) -> None:
-    from gliderwatch.export import netcdf, sections
+    from gliderwatch.export import netcdf
     from gliderwatch.fleet.reference import beside_neighbours
     from gliderwatch.pages import reading
 
@@ -173,7 +173,7 @@ def _write_netcdf(
         netcdf.write(out, view.name, dives, view.now, attributes)
         return
     found, advice = reading.read_section(store, view.name, _ALL)
-    sections.write(out, view.name, found, advice, view.dives, view.now, attributes)
+    netcdf.write_section(out, view.name, found, advice, view.dives, view.now, attributes)
 
 
 @click.command(epilog=example("gliderwatch where electa", "gliderwatch where electa --ais 992441234"))

@@ -124,7 +124,7 @@ def _near(mission: Path) -> tuple[Path, ...]:
 
 def _casts(mission: Path, caches: Sequence[Path], glider: str | None, sensor: str) -> list[tuple[Cast, ...]]:
     """The casts of each segment of one glider in a folder, in order of time; of copies the fullest."""
-    from gliderwatch.layers.water import casts_of, is_own
+    from gliderwatch.layers.casts import casts_of, is_own
     from gliderwatch.slocum import folders
     from gliderwatch.slocum.decode import Decoder, decode_science
 

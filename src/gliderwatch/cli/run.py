@@ -104,7 +104,7 @@ def _replay(request: Request) -> None:
 def _report(report: Report, request: Request, console: Console) -> None:
     from gliderwatch.cli import tables
     from gliderwatch.service.replay import WRITTEN
-    from gliderwatch.service.replay_of_nothing import unassessed
+    from gliderwatch.service.replay_files import unassessed
     from gliderwatch.store.state_file import Status
 
     found = {glider: report.store.assessments(glider) for glider in report.store.gliders()}

@@ -13,8 +13,7 @@ from pydantic import Field, PrivateAttr, SecretStr, TypeAdapter, ValidationError
 
 from gliderwatch.config import secrets
 from gliderwatch.config.document import Document, Problem, nearest, read, shown
-from gliderwatch.config.fields import GliderName, Name, Section
-from gliderwatch.config.health import limits_of
+from gliderwatch.config.fields import GliderName, Name, Section, limits_of
 from gliderwatch.config.schema import (
     Ais,
     Channel,

@@ -14,6 +14,7 @@ from gliderwatch.config.fields import (
     ClockTime,
     Count,
     GliderName,
+    Health,
     Louder,
     Loudness,
     Moment,
@@ -26,7 +27,6 @@ from gliderwatch.config.fields import (
     Url,
     Zone,
 )
-from gliderwatch.config.health import Health
 from gliderwatch.fleet.constants import APART
 from gliderwatch.incidents import send_schedule
 from gliderwatch.model import Severity

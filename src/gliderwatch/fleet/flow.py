@@ -2,10 +2,10 @@
 
 What one glider cannot know: a reference for its flow that knows nothing of its own dead reckoning. All
 currents of a fleet are one Gaussian vector (`Sea`): eddies that turn and forget, a mean flow, tides that
-differ in space, near-inertial motion. That is the basis of `papers.fleet_flow` with its Gaussians infinitely
-dense, which leaves a covariance in closed form. The flow on a dive given the currents is then a regression:
-the same as a Kalman filter and smoother over all of them, whatever order they came in. So there is no state:
-currents are an input, and the dive's own glider is left out of them.
+differ in space, near-inertial motion. That is the basis of 003 (`tests/streamfunction.py`), its Gaussians
+infinitely dense, which leaves a covariance in closed form. The flow on a dive given the currents is a
+regression: the same as a Kalman filter and smoother over all of them, whatever order they came in. So there
+is no state: currents are an input, and the dive's own glider is left out of them.
 """
 
 from __future__ import annotations

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gliderwatch.layers.band import Band, Method, Mode, Tracking, follow
+from gliderwatch.layers.casts import casts_of
 from gliderwatch.layers.composite import Layer
 from gliderwatch.layers.constants import LEAST_BAND, WRONG_ECHOES
-from gliderwatch.layers.water import casts_of
 from gliderwatch.model import Array, Segment, readonly
 
 

@@ -1,4 +1,4 @@
-"""The casts of a segment: its ways down and up, each a profile. Pure."""
+"""The casts of a segment: its ways down and up, each a profile of a property of the water. Pure."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+import gsw
 import numpy as np
 
-from gliderwatch.layers.constants import LEAST_BIN, LEAST_CAST, LEAST_PART, SAMPLES_A_BIN
-from gliderwatch.model import Array, Series, readonly
+from gliderwatch.layers.constants import LATITUDE, LEAST_BIN, LEAST_CAST, LEAST_PART, SAMPLES_A_BIN
+from gliderwatch.model import EMPTY, Array, Segment, Series, readonly
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,3 +79,48 @@ def bin_of(casts: Sequence[Cast]) -> float:
     steps = [np.abs(np.diff(cast.depth)) for cast in casts if len(cast.depth) > 1]
     spacing = float(np.median(np.concatenate(steps))) if steps else 0.0
     return max(SAMPLES_A_BIN * spacing, LEAST_BIN)
+
+
+PROPERTIES = {
+    "temperature": ("degree_Celsius", "sea_water_temperature"),
+    "salinity": ("1", "sea_water_practical_salinity"),
+    "density": ("kg m-3", "sea_water_sigma_theta"),
+    "oxygen": ("umol l-1", "mole_concentration_of_dissolved_molecular_oxygen_in_sea_water"),
+}
+"""What the water is asked for without a sensor's name: unit and CF standard name of each."""
+_PA_PER_DBAR, _MS_CM_PER_S_M = 1e4, 10.0
+
+
+def is_own(name: str) -> bool:
+    """Whether a property is that of a sensor, by its own name and in its own unit."""
+    return name not in PROPERTIES
+
+
+def casts_of(segment: Segment, property_name: str) -> tuple[Cast, ...]:
+    """The casts of a property in a segment; none where it has no science data of it.
+
+    `property_name` is `temperature` (degree C), `salinity` (practical), `density` (potential, less 1000
+    kg/m3), or the name of any quantity of the segment.
+    """
+    pressure, value = segment.get("science_pressure"), _property(segment, property_name)
+    if not len(pressure) or not len(value):
+        return ()
+    depth = readonly(-gsw.z_from_p(pressure.v / _PA_PER_DBAR, LATITUDE))
+    return split(Series(pressure.t, depth), value)
+
+
+def _property(segment: Segment, name: str) -> Series:
+    if name not in ("salinity", "density"):
+        return segment.get(name)
+    warm, salty, pressure = (segment.get(n) for n in ("temperature", "conductivity", "science_pressure"))
+    if not len(warm) or not len(salty):
+        return EMPTY
+    t = salty.t
+    celsius = np.interp(t, warm.t, warm.v)
+    decibar = np.interp(t, pressure.t, pressure.v) / _PA_PER_DBAR
+    value: Array = gsw.SP_from_C(_MS_CM_PER_S_M * salty.v, celsius, decibar)
+    if name == "density":  # of standard sea water: a gradient needs no place
+        absolute = gsw.SR_from_SP(value)
+        value = gsw.sigma0(absolute, gsw.CT_from_t(absolute, celsius, decibar))
+    good = np.isfinite(value)
+    return Series(readonly(t[good]), readonly(value[good]))

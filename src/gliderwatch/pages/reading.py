@@ -17,8 +17,8 @@ from gliderwatch.incidents.acknowledgement import with_mute
 from gliderwatch.incidents.constants import RECENT
 from gliderwatch.incidents.overdue import expected_call, outlook
 from gliderwatch.layers.advice import LayerAdvice
+from gliderwatch.layers.casts import casts_of
 from gliderwatch.layers.section import Section, section
-from gliderwatch.layers.water import casts_of
 from gliderwatch.model import Incident
 from gliderwatch.pages.view import GliderView
 from gliderwatch.params import Attention

@@ -1,5 +1,7 @@
 """Pages as HTML: a function of what they show. Every value is escaped by the templates; a picture is markup
-that `figures` made, with its labels escaped. Pure, but for the templates and the coast in the package."""
+that `figures` made, with its labels escaped. Pure, but for the templates and the coast in the package.
+
+Beside those of the gliders stands the guide, `docs/pilots.md`, with a section for each kind of message."""
 
 from __future__ import annotations
 
@@ -10,11 +12,14 @@ from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 from importlib.resources import files
+from itertools import pairwise
+from pathlib import Path
 from types import MappingProxyType
 from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, pass_context
 from jinja2.runtime import Context
+from markdown_it import MarkdownIt
 from markupsafe import Markup
 
 from gliderwatch import __version__
@@ -23,9 +28,10 @@ from gliderwatch.figures.coast import Land
 from gliderwatch.figures.plots import Panel
 from gliderwatch.figures.timeline import Bar
 from gliderwatch.messages.formatting import clean, duration, flow, utc
+from gliderwatch.messages.guide import anchor
 from gliderwatch.model import Assessment, Flag, Severity
 from gliderwatch.pages import facts, fields, maps
-from gliderwatch.pages.call_log import call_log, transferred
+from gliderwatch.pages.facts import call_log, transferred
 from gliderwatch.pages.fields import FieldView
 from gliderwatch.pages.matters import in_words
 from gliderwatch.pages.view import GliderView, Verdict, verdict, worst_first
@@ -351,3 +357,33 @@ def _environment() -> Environment:
 
 def _render(template: str, frame: Frame, **values: object) -> str:
     return _environment().get_template(template).render(frame=frame, **values)
+
+
+_PAGE = """<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
+<title>What to do: gliderwatch</title><style>{style}</style></head>
+<body><main class="guide"><p><a href="index.html">All gliders</a></p>
+{body}</main></body></html>
+"""
+_ELSEWHERE = re.compile(r"\[([^\]]+)\]\((?!https?:|#)[^)]*\)")
+"""Links to other pages of the documentation, which do not lie here."""
+
+
+@cache
+def guide_page() -> str:
+    """The guide as a page; its headings are the targets of the links in messages."""
+    style, reader = part("style.css"), MarkdownIt()
+    tokens = reader.parse(_ELSEWHERE.sub(r"\1", _path().read_text(encoding="utf-8")))
+    for opening, inline in pairwise(tokens):
+        if opening.type == "heading_open":
+            opening.attrSet("id", anchor(inline.content))
+    body = reader.renderer.render(tokens, reader.options, {})
+    return _PAGE.format(policy=policy([style], []), style=style, body=body)
+
+
+def _path() -> Path:
+    """Where the guide is: beside this module in a wheel, in `docs/` of a checkout."""
+    installed = Path(__file__).with_name("pilots.md")
+    return installed if installed.is_file() else Path(__file__).parents[3] / "docs" / "pilots.md"

@@ -16,6 +16,7 @@ import structlog
 
 from gliderwatch.config import Config, load
 from gliderwatch.errors import ConfigError, DamagedError, GliderwatchError
+from gliderwatch.export.ais import VirtualAis
 from gliderwatch.model import Alert
 from gliderwatch.service import liveness, preconditions, state_outage, transaction
 from gliderwatch.service.fields import catch_up, take_from_relays
@@ -28,7 +29,6 @@ from gliderwatch.service.routing import Routing
 from gliderwatch.service.run import StoppedError
 from gliderwatch.service.runtime import Decoded, News, Ran, Runtime, build
 from gliderwatch.service.state_outage import StateOutage
-from gliderwatch.service.virtual_ais import VirtualAis
 from gliderwatch.slocum.watch import CacheChanged, EventsLost, FileChanged, ScienceChanged
 from gliderwatch.store.state_file import Status, Store
 

@@ -14,12 +14,12 @@ import numpy as np
 
 from gliderwatch.config import Config
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.export.properties import PROPERTIES
 from gliderwatch.fleet.advice import Advice, Bounds, Box, Leg, Point, Way, advise, with_planned
 from gliderwatch.fleet.batches import Sensor, batch_of, params_of, property_of, whereabouts
 from gliderwatch.fleet.constants import BIN, NO_MORE_AT_SEA, USUAL_LEG
 from gliderwatch.fleet.scalar_field import Batch, Checkpoint, FieldParams, at, estimate
 from gliderwatch.forecast.outlook import look_ahead
+from gliderwatch.layers.casts import PROPERTIES
 from gliderwatch.model import Array, Segment, readonly
 from gliderwatch.navigation.geodesy import to_plane
 from gliderwatch.pipeline import GliderState

@@ -22,8 +22,7 @@ from gliderwatch.service.backlog import Job
 from gliderwatch.service.heartbeat import Upkeep
 from gliderwatch.service.layers import layers_of
 from gliderwatch.service.routing import Routing
-from gliderwatch.service.run import Processed, Run
-from gliderwatch.service.run_workers import why_not
+from gliderwatch.service.run import Processed, Run, why_not
 from gliderwatch.service.runtime import Decoded, Ran, Runtime
 from gliderwatch.slocum import folders
 from gliderwatch.slocum.folders import flight_files

@@ -9,7 +9,7 @@ from pathlib import Path
 from gliderwatch.config import Config
 from gliderwatch.layers.advice import LayerAdvice, LayerParams, after
 from gliderwatch.layers.band import Method, Tracking
-from gliderwatch.layers.water import is_own
+from gliderwatch.layers.casts import is_own
 from gliderwatch.model import SegmentId
 from gliderwatch.store.state_file import Store
 

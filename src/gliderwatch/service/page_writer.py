@@ -93,11 +93,11 @@ def write_fleet(
     """Write what is of all gliders, those of `attention`, as known at `now` (s). Raises GliderwatchError."""
     from gliderwatch.export import maps
     from gliderwatch.messages.guide import PAGE
-    from gliderwatch.pages import guide, render, writing
+    from gliderwatch.pages import render, writing
 
     writing.clear(folder, now)
     writing.write_fleet(store, folder, attention, batteries, now, land)
-    writing.put(folder / PAGE, guide.guide_page())
+    writing.put(folder / PAGE, render.guide_page())
     links = [render.file_of(name, ending="kml") for name in store.gliders()]
     writing.put(folder / "gliders.kml", maps.as_kml_link(links))
 

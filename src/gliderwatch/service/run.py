@@ -1,4 +1,5 @@
-"""A run of segments of one glider, processed one after another: a value in, a value out. Pure.
+"""A run of segments of one glider, processed one after another: a value in, a value out; and the processes
+that do so where many files are at hand.
 
 What is to be processed is read from the state file, processed while nobody's write waits for it, and
 committed if by then the same is to be processed (`service.transaction`).
@@ -6,10 +7,19 @@ committed if by then the same is to be processed (`service.transaction`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import copyreg
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
 
-from gliderwatch.errors import GliderwatchError, NotAssessed
+from pebble import ProcessExpired, ProcessPool
+
+from gliderwatch.errors import GliderwatchError, NotAssessed, Retry
 from gliderwatch.model import Segment
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
@@ -71,3 +81,71 @@ def _outcome(state: GliderState, segment: Segment, params: GliderParams, ocean: 
     except Exception as error:
         what = f"{type(error).__name__}: {error}"
         raise NotAssessed(f"cannot be assessed, please report it ({segment.id.name}: {what})") from error
+
+
+LIMIT = 60.0
+"""Seconds that a run may take; one of 16 files takes some tenths."""
+MOST = 4
+"""Processes at most: more than the one that commits can keep up with."""
+
+
+class RunWorkers:
+    """A process for each core, `MOST` at most, begun when there is a run; used by one thread.
+
+    They end where nothing is at hand: a daemon that waits needs no memory for them. They are not those that
+    decode: no foreign code that a damaged file leads astray has been in them.
+    """
+
+    def __init__(self) -> None:
+        self._pool: ProcessPool | None = None
+
+    def submit(self, run: Run, params: GliderParams, is_kept: Sequence[bool]) -> Future[Processed]:
+        """A run to be processed as by `processed_for_another`."""
+        for _ in range(2):
+            if self._pool is None:
+                context = multiprocessing.get_context("spawn")  # to fork a process with threads is unsafe
+                most = min(MOST, len(os.sched_getaffinity(0)))
+                self._pool = ProcessPool(max_workers=most, initializer=_prepare, context=context)
+            try:
+                args = (run, params, tuple(is_kept))
+                made: Future[Processed] = self._pool.schedule(processed_for_another, args=args, timeout=LIMIT)
+                return made
+            except RuntimeError:  # the pool gives up for good when a worker dies that has nothing to do
+                self.stop()
+        raise RuntimeError("the worker processes cannot be started")
+
+    def stop(self) -> None:
+        """End the processes at once."""
+        if self._pool is not None:
+            self._pool.stop()  # type: ignore[no-untyped-call]
+            self._pool.join()
+            self._pool = None
+
+
+def why_not(error: BaseException) -> GliderwatchError:
+    """Why a file could not be processed, from what its run ended with."""
+    if isinstance(error, GliderwatchError):
+        return error
+    if isinstance(error, TimeoutError):
+        return NotAssessed(f"cannot be assessed, please report it (took longer than {LIMIT:.0f} s)")
+    if isinstance(error, ProcessExpired) and -error.exitcode in (
+        signal.SIGTERM,
+        signal.SIGKILL,
+        signal.SIGHUP,
+    ):
+        return Retry("the process that assessed it was ended from outside")
+    return NotAssessed(f"cannot be assessed, please report it ({type(error).__name__}: {error})")
+
+
+def _prepare() -> None:
+    """What a worker does first: it dies at once when it is told to."""
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
+def _frozen(value: Mapping[Any, Any]) -> MappingProxyType[Any, Any]:
+    return MappingProxyType(dict(value))
+
+
+copyreg.pickle(MappingProxyType, lambda value: (_frozen, (dict(value),)))

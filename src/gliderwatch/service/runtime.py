@@ -28,8 +28,7 @@ from gliderwatch.service.mail_pictures import MailPictures
 from gliderwatch.service.page_writer import PagesWritten
 from gliderwatch.service.relays import BatchesCame, RelayExchange, relay_settings
 from gliderwatch.service.routing import Routing, routing_of
-from gliderwatch.service.run import Processed, Run
-from gliderwatch.service.run_workers import RunWorkers
+from gliderwatch.service.run import Processed, Run, RunWorkers
 from gliderwatch.slocum.caches import SensorLists, lists_folder
 from gliderwatch.slocum.decode import Decoder
 from gliderwatch.slocum.folders import Settling

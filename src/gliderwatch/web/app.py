@@ -41,8 +41,7 @@ from gliderwatch.service.liveness import STALE, is_held, seconds_silent
 from gliderwatch.service.page_writer import battery_limits
 from gliderwatch.store.state_file import Store
 from gliderwatch.web import api, live
-from gliderwatch.web.cache import PageCache
-from gliderwatch.web.live import FLEET, LiveJob, LivePage, Shown, files_of, kept
+from gliderwatch.web.live import FLEET, LiveJob, LivePage, PageCache, Shown, files_of, kept
 
 log = structlog.get_logger(__name__)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gliderwatch.layers.water import casts_of
+from gliderwatch.layers.casts import casts_of
 from gliderwatch.model import Segment, SegmentId, Series, readonly
 
 T = np.arange(0.0, 400.0, 10.0)

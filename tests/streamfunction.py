@@ -1,7 +1,7 @@
 """The flow of a fleet on a basis, with the idea of 003's field for depth-averaged currents. Pure.
 
 49 Gaussians of a streamfunction on a grid over the area, a mean flow, and tides that are planes in space.
-Kept as the exact form: `gliderwatch.fleet.flow` has the Gaussians infinitely dense, so that no area needs to
+The exact form: `gliderwatch.fleet.flow` has the Gaussians infinitely dense, so that no area needs to
 be known ahead.
 """
 
