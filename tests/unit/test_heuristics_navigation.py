@@ -114,7 +114,7 @@ class TestDives:
         seen = {"depth": [(100.0 + t, 9.0) for t in range(0, seconds + 1, 10)]}
         seen |= {"fix_lat": [(up.t, up.lat)], "fix_lon": [(up.t, up.lon)]}
         state, dives = extend(Navigation(fix=Fix(90.0, LAT, LON), last_t=95.0), segment("b", 95.0, seen))
-        assert (state.untold is not None) == has_current and dives == []
+        assert (state.pending is not None) == has_current and dives == []
 
     @pytest.mark.parametrize("minutes, count", [(10, 0), (15, 1)])
     def test_a_dive_lasts_a_quarter_of_an_hour(self, minutes, count):

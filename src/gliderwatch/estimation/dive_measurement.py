@@ -183,8 +183,8 @@ def _is_free(dive: Dive) -> bool:
 
 def is_unmeasured(dive: Dive) -> bool:
     """Whether the headings of a dive are not those of its compass."""
-    known = dive.features
-    return known.heading_reckoned or known.heading_commanded > 0 or known.heading_assumed
+    features = dive.features
+    return features.heading_reckoned or features.heading_commanded > 0 or features.heading_assumed
 
 
 def _directed(vectors: Array, velocities: Array, share: Array, dive: Dive) -> tuple[Array, Array]:

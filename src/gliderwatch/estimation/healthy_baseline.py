@@ -82,11 +82,11 @@ class Baseline:
     can be kept: a dive comes again when its current is corrected.
 
     ``dives`` ((k, n), k at most `BASELINE_MOST`) has a column for each of `QUANTITIES`, for the depth reached
-    and for the thruster; ``known`` (the same shape) is 1 where a dive tells, else 0.
+    and for the thruster; ``measured`` (the same shape) is 1 where a dive has the number, else 0.
     """
 
     dives: Array = field(default_factory=lambda: readonly(np.empty((0, len(_COLUMN)))))
-    known: Array = field(default_factory=lambda: readonly(np.empty((0, len(_COLUMN)))))
+    measured: Array = field(default_factory=lambda: readonly(np.empty((0, len(_COLUMN)))))
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,8 +113,8 @@ def learn(baseline: Baseline, features: DiveFeatures) -> Baseline:
     if len(alike) > BASELINE_FIRST + BASELINE_RECENT:
         dives = np.delete(dives, alike[BASELINE_FIRST], axis=0)
     dives = dives[-BASELINE_MOST:]
-    known = np.isfinite(dives)
-    return Baseline(readonly(np.where(known, dives, 0.0)), readonly(known))
+    measured = np.isfinite(dives)
+    return Baseline(readonly(np.where(measured, dives, 0.0)), readonly(measured))
 
 
 @lru_cache(maxsize=64)
@@ -125,13 +125,13 @@ def compare(baseline: Baseline, features: DiveFeatures) -> Mapping[str, Usual]:
     row = _row(features)
     dives = _dives(baseline)
     dives = dives[_same_setting(dives, row)]
-    known = np.isfinite(dives)
+    measured = np.isfinite(dives)
     same = {given: _same_trim(dives, row, given) for given in _GIVEN}
     out = {}
     for i, (quantity, value) in enumerate(zip(QUANTITIES, row.tolist(), strict=False)):
         if isfinite(value):
-            tells = known[:, i]
-            usual = _usual(dives[tells, i].tolist(), same[quantity.given][tells].tolist(), quantity)
+            have = measured[:, i]
+            usual = _usual(dives[have, i].tolist(), same[quantity.given][have].tolist(), quantity)
             if usual is not None:
                 out[quantity.name] = Usual(value, *usual)
     return MappingProxyType(out)
@@ -173,8 +173,8 @@ def derived(features: DiveFeatures) -> dict[str, float]:
 
 
 def _dives(baseline: Baseline) -> Array:
-    """The dives with NaN where one does not tell."""
-    return np.where(baseline.known > 0, baseline.dives, np.nan)
+    """The dives with NaN where one has not the number."""
+    return np.where(baseline.measured > 0, baseline.dives, np.nan)
 
 
 def _row(features: DiveFeatures) -> Array:
@@ -182,8 +182,8 @@ def _row(features: DiveFeatures) -> Array:
 
     They are compared as they are published, because what is usual is published beside them.
     """
-    known = {"thruster": 0.0, **evidence(features), **derived(features)}
-    return np.array([known.get(name, np.nan) for name in _COLUMN], dtype=np.float64)
+    numbers = {"thruster": 0.0, **evidence(features), **derived(features)}
+    return np.array([numbers.get(name, np.nan) for name in _COLUMN], dtype=np.float64)
 
 
 def _same_setting(dives: Array, row: Array) -> NDArray[np.bool_]:
@@ -192,21 +192,21 @@ def _same_setting(dives: Array, row: Array) -> NDArray[np.bool_]:
     return np.asarray((np.abs(dives[:, at] - row[at]) < LIKE) & ((dives[:, at] > 0) == (row[at] > 0)))
 
 
-def _usual(known: list[float], alike: list[bool], quantity: Quantity) -> tuple[float, float, float] | None:
-    """Low, usual and high value of a number among the dives that tell it, None where they are too few.
+def _usual(values: list[float], alike: list[bool], quantity: Quantity) -> tuple[float, float, float] | None:
+    """Low, usual and high value of a number among the dives that have it, None where they are too few.
 
     ``alike``: whether each was at the same trim.
     """
-    windows = [known[:BASELINE_FIRST], known[-BASELINE_RECENT:]]
+    windows = [values[:BASELINE_FIRST], values[-BASELINE_RECENT:]]
     if quantity.given:
-        first = list(compress(known[:BASELINE_FIRST], alike))
+        first = list(compress(values[:BASELINE_FIRST], alike))
         # the first dives alone, so that what grows slowly is not usual in the end
-        windows = [first if len(first) >= BASELINE_LEAST else list(compress(known, alike))]
+        windows = [first if len(first) >= BASELINE_LEAST else list(compress(values, alike))]
     if len(windows[-1]) < BASELINE_LEAST:
         return None
-    if len(known) <= min(BASELINE_FIRST, BASELINE_RECENT):
+    if len(values) <= min(BASELINE_FIRST, BASELINE_RECENT):
         del windows[1:]  # the first are the latest too
-    ranges = [_range(values, quantity) for values in windows]
+    ranges = [_range(window, quantity) for window in windows]
     return min(low for low, _, _ in ranges), ranges[-1][1], max(high for _, _, high in ranges)
 
 

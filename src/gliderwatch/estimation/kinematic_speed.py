@@ -93,11 +93,11 @@ def kinematic_speed(ratios: Ratios, features: DiveFeatures) -> KinematicSpeed | 
     """W as a dive tells it; None where it does not."""
     if features.duration < SHORTEST:
         return None
-    for source, value, known in (
+    for source, value, earlier in (
         (VERTICAL, vertical(features), ratios.vertical),
         (ONBOARD, features.onboard_speed, ratios.onboard),
     ):
-        found = _ratio(source, known)
+        found = _ratio(source, earlier)
         if value is not None and value > 0 and found is not None:
             ratio, sigma = found
             return KinematicSpeed(ratio * value, sigma * ratio * value, source.lies, source is VERTICAL)
@@ -108,10 +108,10 @@ def _with(ratios: tuple[float, ...], value: float | None, own: float) -> tuple[f
     return ratios if value is None or not value > 0 else (*ratios, own / value)[-RATIOS_KEPT:]
 
 
-def _ratio(source: Source, known: tuple[float, ...]) -> tuple[float, float] | None:
+def _ratio(source: Source, ratios: tuple[float, ...]) -> tuple[float, float] | None:
     """The ratio of W to a speed, and its standard error as a part of it."""
-    if len(known) < RATIOS_FEW:
+    if len(ratios) < RATIOS_FEW:
         return source.first
-    ratio = median(known)
-    spread = MAD_TO_SIGMA * median(abs(each / ratio - 1) for each in known)
+    ratio = median(ratios)
+    spread = MAD_TO_SIGMA * median(abs(each / ratio - 1) for each in ratios)
     return ratio, max(spread, source.least)

@@ -82,9 +82,9 @@ def learn(
 ) -> Normal:
     """The healthy dives with one more, of a ``duration`` (s) at a setting, after all that came ``before``."""
     is_trial = duration < params.shortest and before < params.trials
-    known = int(_alike(normal, at).sum())
+    similar = int(_alike(normal, at).sum())
     every = max(round(params.spacing / max(duration, 1.0)), 1)
-    if is_trial or known >= params.most or (known >= params.least and before % every):
+    if is_trial or similar >= params.most or (similar >= params.least and before % every):
         return normal
     return Normal(readonly([*normal.speeds, speed]), readonly([*normal.settings, at]))
 

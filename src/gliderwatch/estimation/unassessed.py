@@ -26,8 +26,8 @@ def unassessed(dive: Dive, params: GliderParams, digest: str, reason: str) -> As
     """
     place = dive.end if dive.end is not None else dive.start
     # where nothing tells the course there is nothing along it, or across
-    known = dive.track is not None and not dive.features.heading_assumed
-    closed = closure(dive.track, dive.current) if known and dive.track and dive.current else None
+    has_course = dive.track is not None and not dive.features.heading_assumed
+    closed = closure(dive.track, dive.current) if has_course and dive.track and dive.current else None
     return Assessment(
         glider=dive.glider,
         segment=dive.segment,

@@ -254,9 +254,9 @@ def step(
             return state, Verdict(
                 flag, reason, normal, info, (kinematic.speed * left, kinematic.sigma * left)
             )
-    known = normal
+    earlier = normal
     state, flag, reason, normal = _regime(state, dive, info, kinematic, normal, flag, reason, params)
-    before = known.usual if reason.startswith(NEW_WAY) else None
+    before = earlier.usual if reason.startswith(NEW_WAY) else None
     if flag is Flag.NORMAL and not frozen and not state.other:
         state = replace(_learnt(state, dive, info, at, params), trim=_trim(dive))
     return state, Verdict(flag, reason, normal, info, before=before)

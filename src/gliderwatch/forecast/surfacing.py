@@ -258,12 +258,12 @@ def _scores(state: Surfacings, dive: Dive, end: Fix) -> tuple[float, ...]:
 
     The way through the water is that over ground less the current: it is known without headings too.
     """
-    over_ground, speed, known = ground(dive), state.speed, state.current
-    if over_ground is None or speed is None or known is None or state.fix is None or state.heading is None:
+    over_ground, speed, current = ground(dive), state.speed, state.current
+    if over_ground is None or speed is None or current is None or state.fix is None or state.heading is None:
         return state.scores
-    met = known if dive.current is None else (dive.current.u, dive.current.v)
+    met = current if dive.current is None else (dive.current.u, dive.current.v)
     really = (over_ground - met) / speed
-    made, scores = courses(plan(state, speed, known), max(end.t - state.fix.t, 1.0)), []
+    made, scores = courses(plan(state, speed, current), max(end.t - state.fix.t, 1.0)), []
     for score, course in zip(state.scores, made, strict=True):
         part = (1 - DIVE_MEMORY) * (1 - course.unknown)
         square = min(float(np.sum((course.heading - really) ** 2)), WORST_COURSE)
@@ -283,10 +283,10 @@ def _misses(state: Surfacings, dive: Dive, end: Fix, expected: NextSurfacing | N
     return (*state.misses, distance)[-MISSES_KEPT:]
 
 
-def _waypoints(known: tuple[Place, ...], reported: Place | None) -> tuple[Place, ...]:
-    if reported is None or (known and is_same(known[-1], reported)):
-        return known
-    return (*known, reported)[-WAYPOINTS_KEPT:]
+def _waypoints(earlier: tuple[Place, ...], reported: Place | None) -> tuple[Place, ...]:
+    if reported is None or (earlier and is_same(earlier[-1], reported)):
+        return earlier
+    return (*earlier, reported)[-WAYPOINTS_KEPT:]
 
 
 def _flown(state: Surfacings, dive: Dive) -> Surfacings:
@@ -421,8 +421,8 @@ def _heading(state: Surfacings, speed: float, flow: Array, dive: float) -> tuple
     The ways count by what they were worth before. Of the part of a dive that comes after the last waypoint
     known the heading is not known: any is as likely.
     """
-    known = state.current or (float(flow[0]), float(flow[1]))
-    made = courses(plan(state, max(state.speed or speed, SLOWEST), known), dive)
+    current = state.current or (float(flow[0]), float(flow[1]))
+    made = courses(plan(state, max(state.speed or speed, SLOWEST), current), dive)
     scores = np.array(state.scores)
     weights = (scores + FLOORS) ** -2
     weights /= weights.sum()

@@ -122,12 +122,12 @@ def _of_calls(
     notified: NotificationState, facts: GliderFacts, wanted: Wanted, now: float
 ) -> tuple[NotificationState, list[Notice]]:
     """What a glider reported in its calls, and that it calls and sends no file."""
-    known = facts.calls(now - GONE)
+    recent = facts.calls(now - GONE)
     episodes, notices = aborts.announce(
-        facts.glider, notified.aborts, known, now, wanted.acks, wanted.reminder_hours
+        facts.glider, notified.aborts, recent, now, wanted.acks, wanted.reminder_hours
     )
-    signs = facts.signs(now - GONE) if known else ()
-    empty, more = calls.announce(facts.glider, notified.empty, known, signs, now, wanted.acks)
+    signs = facts.signs(now - GONE) if recent else ()
+    empty, more = calls.announce(facts.glider, notified.empty, recent, signs, now, wanted.acks)
     return replace(notified, aborts=episodes, empty=empty), [*notices, *more]
 
 

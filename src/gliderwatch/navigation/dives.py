@@ -158,9 +158,9 @@ class Navigation:
     latest segment (s); ``holes`` the times (start, end) since the fix of which no segment has come;
     ``calls`` those between two segments that follow each other, in which none is missing, and ``last_name``
     the name of the latest segment if it holds a whole flight and ends at the surface (else empty: it may
-    break off); ``holder`` the segment that holds the flight since the fix; ``known`` the currents reported
-    last and ``reports`` those whose dive is not returned yet; ``dive`` the last whole dive, ``untold`` the
-    surfacing (s) of a later one that is not returned; ``notes`` on the data since the fix;
+    break off); ``holder`` the segment that holds the flight since the fix; ``last_reported`` the currents
+    reported last and ``reports`` those whose dive is not returned yet; ``dive`` the last whole dive,
+    ``pending`` the surfacing (s) of a later one that is not returned; ``notes`` on the data since the fix;
     ``latest`` the name of the latest segment; ``surface_depth`` what the depth sensor shows at the surface
     (m; 0: near enough).
     """
@@ -174,10 +174,10 @@ class Navigation:
     calls: tuple[tuple[float, float], ...] = ()
     last_name: str = ""
     holder: str = ""
-    known: LastReported = (None, None)
+    last_reported: LastReported = (None, None)
     reports: tuple[Report, ...] = ()
     dive: Dive | None = None
-    untold: float | None = None
+    pending: float | None = None
     notes: tuple[str, ...] = ()
     latest: str = ""
     surface_depth: float = 0.0
@@ -197,22 +197,22 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
     fresh, surface = zeroed(fresh, fixes, state.surface_depth)
     state = replace(state, surface_depth=surface)
     samples = concatenated(state.carry, fresh)
-    reports, last_reported = new_reports(segment, state.declination or 0.0, state.known)
+    reports, last_reported = new_reports(segment, state.declination or 0.0, state.last_reported)
     quality = segment_notes(segment, state.declination, from_model=state.declination_t is None)
     quality += corrected_notes(step, surface)
-    state = replace(_placed(state, segment, fresh, quality), known=last_reported)
+    state = replace(_placed(state, segment, fresh, quality), last_reported=last_reported)
 
     before = state.dive
     if "fix_lat" in state.carry:
         fixes = new_fixes(samples, state.fix)
     state, finished = _withdraw_old_fix(state, fixes)
-    untold = [state.untold] if state.untold is not None else []
+    pending = [state.pending] if state.pending is not None else []
     for first, last in surface_intervals(fixes, SHORTEST_DIP):
         flight = _flight_since(state, samples, first)
         if flight is not None and flight.duration >= SHORTEST_DIVE:
             finished.append(_dive(state, segment.id.glider, samples, flight, first))
         elif flight is not None and flight.duration >= SHORTEST_DIP:
-            untold.append(flight.end)
+            pending.append(flight.end)
         holes = tuple((max(a, last.t), b) for a, b in state.holes if b > last.t)
         calls = tuple((a, b) for a, b in state.calls if b > last.t)
         state = replace(state, fix=last, holder=segment.id.name, holes=holes, calls=calls, notes=quality)
@@ -220,12 +220,12 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
     oldest = (state.last_t or 0.0) - LONGEST_DIVE
     carry = after(samples, max(state.fix.t, oldest) if state.fix is not None else oldest)
     under_way = _flight_since(state, carry, None)
-    finished, waiting = _with_currents(finished, untold, under_way, [*state.reports, *reports])
+    finished, waiting = _with_currents(finished, pending, under_way, [*state.reports, *reports])
     waiting = [report for report in waiting if report.t > oldest]
-    latest, later = (finished[-1] if finished else None), max(untold, default=None)
+    latest, later = (finished[-1] if finished else None), max(pending, default=None)
     later = later if later is not None and (latest is None or later > latest.t_surface) else None
     name = state.last_name if under_way is None else ""
-    state = replace(state, carry=carry, reports=tuple(waiting), dive=latest, untold=later, last_name=name)
+    state = replace(state, carry=carry, reports=tuple(waiting), dive=latest, pending=later, last_name=name)
     news = [d for d in finished if d is not before]
     if under_way is not None and under_way.duration >= SHORTEST_DIVE:
         news.append(_dive(state, segment.id.glider, carry, under_way, None))
@@ -382,11 +382,11 @@ def _dive(state: Navigation, glider: str, samples: Samples, flight: Flight, end:
 
 
 def _with_currents(
-    finished: list[Dive], untold: list[float], under_way: Flight | None, reports: list[Report]
+    finished: list[Dive], pending: list[float], under_way: Flight | None, reports: list[Report]
 ) -> tuple[list[Dive], list[Report]]:
     """The dives with the currents published for them, and the reports of a dive that is not returned yet.
 
-    `untold` are surfacings (s) of dives that are never returned: their currents are nobody's. One that was
+    `pending` are surfacings (s) of dives that are never returned: their currents are nobody's. One that was
     published well within a flight is that of a part of it, up to a surfacing without a fix: so is then the
     one at its end, and neither is the current between the two fixes.
     """
@@ -394,7 +394,7 @@ def _with_currents(
     if under_way is not None:
         flights.append((under_way.start, under_way.end, -1))
     ends: list[tuple[float, int | None]] = [(d.t_surface, i) for i, d in enumerate(finished)]
-    ends = sorted([*ends, *((t, None) for t in untold)], key=lambda end: end[0])
+    ends = sorted([*ends, *((t, None) for t in pending)], key=lambda end: end[0])
     surfaced = [t for t, _ in ends] + ([under_way.end] if under_way is not None else [])
     out, waiting = list(finished), []
     for report, k in zip(reports, pair(reports, surfaced), strict=True):

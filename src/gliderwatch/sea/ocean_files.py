@@ -175,8 +175,8 @@ def _axes(path: Path, data: xr.Dataset, current: xr.DataArray) -> dict[str, xr.D
             f"{path}: latitude and longitude are not the axes of the grid (a curvilinear or unstructured "
             "model): put it on a regular one first, e.g. `cdo remapbil,r3600x1800`"
         )
-    known = {each.dims[0] for each in found.values() if each.ndim}
-    more = [str(dim) for dim in current.dims if dim not in known and current.sizes[dim] > 1]
+    axes = {each.dims[0] for each in found.values() if each.ndim}
+    more = [str(dim) for dim in current.dims if dim not in axes and current.sizes[dim] > 1]
     if more:
         raise Quarantine(
             f"{path}: {current.name} has an axis {more[0]} that is not time, depth (m), latitude or "

@@ -118,6 +118,19 @@ def with_legs(state: Any) -> Any:
     return state
 
 
+def plain_names(state: Any) -> Any:
+    """Layout 5 to 6: what was called known or untold says of what."""
+    navigation = state.get("navigation", {})
+    for old, new in (("known", "last_reported"), ("untold", "pending")):
+        if old in navigation:
+            moved(navigation, old, new)
+    for memory in (state.get("settled", {}), state.get("memory", {})):
+        baseline = memory.get("estimate", {}).get("baseline", {})
+        if "known" in baseline:
+            moved(baseline, "known", "measured")
+    return state
+
+
 def _array(written: Mapping[str, Any]) -> Array:
     """An array as a record holds it."""
     return np.frombuffer(base64.b64decode(written["f64"]), dtype="<f8").reshape(written["shape"])
@@ -135,7 +148,7 @@ def same(segment: Any) -> Any:
 
 
 CONVERTERS: Mapping[type, tuple[Converter, ...]] = {
-    GliderState: (typed_dives, one_sea, one_level, with_legs),
+    GliderState: (typed_dives, one_sea, one_level, with_legs, plain_names),
     Segment: (same,),
 }
 """For each kind of record the way from layout 1 to today's: the n-th leads from layout n to n + 1. What is in

@@ -94,14 +94,14 @@ def withdraw(db: sqlite3.Connection, glider: str, unanswered: Collection[str], n
 def released(db: sqlite3.Connection) -> str:
     """SQL: until when a row of the outbox ``o`` is or was held (s), also in a file that the service has not
     migrated yet."""
-    known = "SELECT 1 FROM pragma_table_info('outbox') WHERE name = 'escalates'"
-    return "min(o.held_until, o.escalates)" if db.execute(known).fetchone() is not None else "0.0"
+    has_column = "SELECT 1 FROM pragma_table_info('outbox') WHERE name = 'escalates'"
+    return "min(o.held_until, o.escalates)" if db.execute(has_column).fetchone() is not None else "0.0"
 
 
 def delivery(db: sqlite3.Connection) -> str:
     """SQL: how it stands with a row of the innermost outbox, also in a file that is not migrated yet."""
-    known = "SELECT 1 FROM pragma_table_info('outbox') WHERE name = 'delivery'"
-    return "delivery" if db.execute(known).fetchone() is not None else DELIVERY_BY_WORDS
+    has_column = "SELECT 1 FROM pragma_table_info('outbox') WHERE name = 'delivery'"
+    return "delivery" if db.execute(has_column).fetchone() is not None else DELIVERY_BY_WORDS
 
 
 def undelivered(db: sqlite3.Connection) -> list[Undelivered]:

@@ -192,13 +192,13 @@ class Store:
     def record_sign(self, identity: SegmentId, last_t: float | None, now: float) -> None:
         """Note a sign of life: a file of a segment came, with its last sample (s) if it was read; by the
         glider's clock."""
-        known = self._db.execute(
+        updated = self._db.execute(
             "UPDATE heard SET opened_at = ?3 + clock_offset, at = min(at, ?5), last_t = max("
             "coalesce(last_t, ?4 + clock_offset), coalesce(?4 + clock_offset, last_t)) "
             "WHERE glider = ?1 AND segment = ?2 AND abs(opened_at - clock_offset - ?3) <= ?6",
             (identity.glider, identity.name, identity.opened_at, last_t, now, SAME_OPENING),
         )
-        if not known.rowcount:
+        if not updated.rowcount:
             self._db.execute(
                 "INSERT INTO heard (glider, segment, opened_at, last_t, at) VALUES (?, ?, ?, ?, ?)",
                 (identity.glider, identity.name, identity.opened_at, last_t, now),
