@@ -13,8 +13,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from gliderwatch.archive import missions, report, summary
-from gliderwatch.archive.hindcast import Found, Hindcast, delays
+from gliderwatch.archive.difference import Found, delays
+from gliderwatch.archive.hindcast import Hindcast
 from gliderwatch.archive.missions import Mission
+from gliderwatch.archive.onset import Onset
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.simulate.delivery import write_full_rate, write_mission
 from gliderwatch.simulate.glider import simulate
@@ -91,10 +93,16 @@ def test_the_speed_in_delayed_mode_is_the_true_one(place: Path, made: tuple[Path
     assert np.median(off[9:]) < 0.03  # with the remora
 
 
-def test_what_was_measured_around_each_flag_is_shown(made: tuple[Path, Mission, Hindcast]) -> None:
+def test_what_was_measured_around_each_flag_is_shown(
+    place: Path, made: tuple[Path, Mission, Hindcast]
+) -> None:
     out, _, found = made
     assert found.full is not None
     since = min(one.since for one in found.full.incidents)
+    began = json.loads((place / "truth.json").read_text())[0][0] + 0.8 * DAY
+    (one,) = {i.onset for i in found.full.incidents if i.since == since}
+    assert one is not None
+    assert abs(one.t - began) < 900.0
     with netCDF4.Dataset(out / report.NUMBERS) as data:
         around = {name: data[name] for name in data.groups if "_around_" in name}
         assert {name.partition("_")[0] for name in around} == {"roll", "pitch", "heading", "ballast", "depth"}
@@ -122,8 +130,13 @@ def test_the_papers_law_shows_its_error_and_its_basis(place: Path, tmp_path: Pat
     assert mission.full is False
     assert found.estimator == "adaptive:franklin"
     with netCDF4.Dataset(tmp_path / mission.name / report.NUMBERS) as data:
-        assert len(data["clle"]["largest_of_the_dive"]) > 5
         assert len(data["track"]["basis_function_lat"]) >= 1
+        clle, speed, dives = data["clle"], data["speed_along_the_track"], data["speed"]
+        assert len(clle["east_time"]) == len(data["track"]["learnt_lat"]) > 2 * len(dives["through_water"])
+        assert np.hypot(clle["east"][:], clle["north"][:]).max() < 500.0
+        # Between surfacings too; at the end of each dive it is what was assessed, but for the moment.
+        ends = np.interp(dives["through_water_time"][:], speed["learnt_time"][:], speed["learnt"][:])
+        assert np.abs(ends - dives["through_water"][:]).max() < 1e-3
 
 
 def test_an_archive_may_lie_in_an_object_store(place: Path) -> None:
@@ -147,12 +160,22 @@ def test_folders_that_hold_no_mission_are_named(tmp_path: Path) -> None:
 
 def test_delays_are_of_the_same_incident() -> None:
     full = [
-        Found("anomaly", 0.0, 3600.0, 9e4),
-        Found("anomaly", 2e5, 2.1e5, None),
+        Found("anomaly", 0.0, 3600.0, 9e4, onset=Onset(600.0, 500.0, 700.0, ())),
+        Found("anomaly", 20 * DAY, 20.1 * DAY, None),
         Found("false_alarm", 0, 1, 2),
     ]
-    online = [Found("anomaly", 3600.0, 10800.0, None)]
-    assert delays(full, online) == (("anomaly", 2.0), ("anomaly", -55.333333333333336), ("false_alarm", None))
+    online = [Found("anomaly", 3600.0, 10800.0, None, on_shore=11400.0)]
+    first, second, third = delays(full, online)
+    assert (first.sent, first.later, first.after) == (online[0], 2.0, 3.0)
+    # What was open for weeks tells nothing of what begins now: no "480 hours earlier".
+    assert (second.sent, second.later, second.already) == (None, None, 3600.0)
+    assert (third.sent, third.after, third.already) == (None, None, None)
+
+
+def test_of_two_incidents_each_has_its_own_delay() -> None:
+    full = [Found("anomaly", 0.0, 3600.0, DAY), Found("anomaly", 1.2 * DAY, 1.3 * DAY, None)]
+    online = [Found("anomaly", 0.3 * DAY, 0.4 * DAY, DAY), Found("anomaly", 1.3 * DAY, 1.5 * DAY, None)]
+    assert [one.sent for one in delays(full, online)] == online
 
 
 def test_the_summary_is_a_table_and_a_page(made: tuple[Path, Mission, Hindcast], tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,12 @@ import numpy as np
 
 from gliderwatch import __version__
 from gliderwatch.archive import delayed
-from gliderwatch.archive.hindcast import Evidence
+from gliderwatch.archive.along import Along
+from gliderwatch.archive.hindcast import Evidence, Replayed
 from gliderwatch.archive.spells import Spell
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.export.netcdf import SINCE
-from gliderwatch.figures import dives, plots
+from gliderwatch.figures import coast, dives, plots
 from gliderwatch.figures.plots import Line, Panel
 from gliderwatch.messages.formatting import utc
 from gliderwatch.model import Array, Assessment
@@ -30,25 +32,77 @@ _RING = [(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * np.pi, 73)]
 
 
 def panels(evidence: Evidence) -> list[Panel]:
-    """The panels over time: how far the track is off, CLLE, speed and flow, what corroborates, currents in
-    delayed mode, what was measured around each flag."""
-    some = evidence.best
-    made = [_off(evidence), *_clle(some), *dives.panels(some)]
+    """The panels over time: how far the track is off, CLLE, speed and flow, what corroborates; the same of
+    the files as sent, where there are full ones too; currents in delayed mode, what was measured around each
+    flag."""
+    best, sent = evidence.best, evidence.online
+    made = [_off(best), *_law(best), *dives.panels(best.assessments)]
+    if sent is not None and sent is not best:
+        some = [_off(sent), *_law(sent), dives.speed(sent.assessments), *dives.flow(sent.assessments)]
+        made += [replace(panel, name=f"{panel.name}, as sent") for panel in some if _has_values(panel)]
     if evidence.delayed is not None:
         made += _delayed(evidence)
     return [*made, *(panel for spell in evidence.spells for panel in _around(spell))]
 
 
-def _off(evidence: Evidence) -> Panel:
-    fixes, led = track(evidence)
+def _has_values(panel: Panel) -> bool:
+    return any(np.isfinite(line.v).any() for line in panel.lines)
+
+
+def _off(made: Replayed) -> Panel:
+    fixes, led = track(made.assessments)
     off = np.array([np.hypot(*displacement(*a, *b)) for a, b in zip(led, fixes, strict=True)])
     shows = (
         "How far from each surfacing the estimated speed and flow would have led the glider, from the "
         "surfacing before and on the course that it made."
     )
-    return Panel(
-        "Error of the track", "error (m)", shows, (Line("of the dive", _fixed(evidence), off),), zero=True
+    lines = (Line("of the dive", _fixed(made.assessments), off),)
+    return Panel("Error of the track", "error (m)", shows, lines, zero=True)
+
+
+def _law(made: Replayed) -> list[Panel]:
+    """The law of the papers between surfacings too (Figs. 5, 6 and 7 of 000)."""
+    law = made.along
+    return [] if law is None else [_clle(law), _learnt_speed(made, law), *_learnt_flow(made, law)]
+
+
+def _clle(law: Along) -> Panel:
+    shows = (
+        "The controlled Lagrangian localisation error: how far the learnt trajectory is from that of the "
+        "glider. Near 0 when speed and flow explain it."
     )
+    lines = tuple(Line(way, law.t, law.error[:, i]) for i, way in enumerate(("east", "north")))
+    return Panel("CLLE", "error (m)", shows, lines)
+
+
+def _learnt_speed(made: Replayed, law: Along) -> Panel:
+    outs = np.array([one.out for one in made.judged.incidents if one.out is not None])
+    shows = (
+        "Speed through the water as it is learnt along the track, between surfacings too, against its normal "
+        "range (shaded). Marked is since when it was out of that, where an incident followed."
+    )
+    return Panel(
+        "Speed along the track",
+        "speed (m/s)",
+        shows,
+        (Line("learnt", law.t, law.speed),),
+        (law.t, law.low, law.high),
+        (("out of range", outs, np.interp(outs, law.t, law.speed)),),
+        zero=True,
+    )
+
+
+def _learnt_flow(made: Replayed, law: Along) -> Iterator[Panel]:
+    some = [
+        (d.t_surface, d.reference_u, d.reference_v)
+        for d in made.assessments
+        if d.reference_u is not None and d.reference_v is not None
+    ]
+    t, *reported = np.array(some, dtype=float).reshape(-1, 3).T
+    for i, way in enumerate(("east", "north")):
+        lines = (Line("learnt", law.t, law.flow[:, i]), Line("reported", t, reported[i]))
+        shows = f"The current to the {way} as it is learnt along the track, and as the glider reported it."
+        yield Panel(f"Current to the {way} along the track", f"{way} (m/s)", shows, lines)
 
 
 _UNITS = {
@@ -70,22 +124,13 @@ def _around(spell: Spell) -> Iterator[Panel]:
             f"{utc(spell.since)}, the first flagged: {flag}."
         )
         line = Line("measured", series.t, series.v * factor, joined=name != "heading")
-        at = np.array([spell.since])
-        mark = (flag, at, np.interp(at, line.t, line.v))
+        marks = [(flag, np.array([spell.since]))]
+        if spell.onset is not None:
+            shows += f" Depth rate, pitch and roll changed at {utc(spell.onset.t)}."
+            marks.append(("began", np.array([spell.onset.t])))
         title = f"{name.capitalize()} around {utc(spell.since)}"
-        yield Panel(title, unit, shows, (line,), marked=(mark,), down=name == "depth")
-
-
-def _clle(some: Sequence[Assessment]) -> list[Panel]:
-    found = [(d.t_surface, d.clle_max) for d in some if d.clle_max is not None]
-    if not found:
-        return []
-    t, v = np.array(found, dtype=float).T
-    shows = (
-        "The largest controlled Lagrangian localisation error of each dive: how far the learnt trajectory is "
-        "from the one flown. It falls as speed and flow are learnt, and rises where either changes."
-    )
-    return [Panel("CLLE", "error (m)", shows, (Line("largest of the dive", t, v),), zero=True)]
+        marked = tuple((words, at, np.interp(at, line.t, line.v)) for words, at in marks)
+        yield Panel(title, unit, shows, (line,), marked=marked, down=name == "depth")
 
 
 def _delayed(evidence: Evidence) -> list[Panel]:
@@ -108,8 +153,8 @@ def _delayed(evidence: Evidence) -> list[Panel]:
 
 
 def _delayed_speed(evidence: Evidence, found: Currents) -> Panel:
-    at, speed = delayed.speeds(evidence.dives, found)
-    some = [(d.t_surface, d.speed) for d in evidence.best if d.speed is not None]
+    at, speed = delayed.speeds(evidence.best.dives, found)
+    some = [(d.t_surface, d.speed) for d in evidence.best.assessments if d.speed is not None]
     then, online = np.array(some, dtype=float).reshape(-1, 2).T
     shows = (
         "Speed through the water in delayed mode: what the currents of the whole mission leave of the ground "
@@ -119,15 +164,15 @@ def _delayed_speed(evidence: Evidence, found: Currents) -> Panel:
     return Panel("Delayed mode, speed", "speed (m/s)", shows, lines, zero=True)
 
 
-def _fixed(evidence: Evidence) -> Array:
+def _fixed(some: Sequence[Assessment]) -> Array:
     """The times (s) of the surfacings that `track` has."""
-    return np.array([d.t_surface for d in evidence.best if d.lat is not None and d.lon is not None])
+    return np.array([d.t_surface for d in some if d.lat is not None and d.lon is not None])
 
 
-def track(evidence: Evidence) -> tuple[Array, Array]:
+def track(assessments: Sequence[Assessment]) -> tuple[Array, Array]:
     """Fixes (degrees, (n, 2): latitude, longitude) at the surfacings, and where the estimated speed and flow
     would have led from the one before ((n, 2), NaN where there is no estimate)."""
-    some = [d for d in evidence.best if d.lat is not None and d.lon is not None]
+    some = [d for d in assessments if d.lat is not None and d.lon is not None]
     fixes = np.array([(d.lat, d.lon) for d in some], dtype=float).reshape(-1, 2)
     led = np.full(fixes.shape, np.nan)
     for i in range(1, len(some)):
@@ -144,30 +189,62 @@ def track(evidence: Evidence) -> tuple[Array, Array]:
     return fixes, led
 
 
-def track_figure(evidence: Evidence) -> Any:
-    """The track with where the estimate leads, and the basis functions of the papers' law."""
-    fixes, led = track(evidence)
+def track_figures(evidence: Evidence) -> list[tuple[str, str, Any]]:
+    """The maps, by the best files and, where there are both, by those sent: name, what it shows, figure."""
+    shows = (
+        "Where it surfaced, and where speed and flow as estimated would have led it. Land is grey.",
+        "The trajectory of the glider, the one that was learnt, and the basis functions with their width. "
+        "Land is grey.",
+    )
+    out, best = [], evidence.best
+    for name, made in ((TRACK, best), (f"{TRACK}, as sent", evidence.online)):
+        if made is not None and (made is not best or name == TRACK):
+            found = evidence.delayed if made is best else None
+            figure = _map(made, evidence.width, found.delayed if found is not None else None)
+            out.append((name, shows[made.along is not None], figure))
+    return out
+
+
+def _map(made: Replayed, width: float, currents: Currents | None) -> Any:
+    fixes, led = track(made.assessments)
     figure = plots.library().figure.Figure(figsize=(5.4, 4.6), layout="constrained")
     axis = figure.add_subplot()
-    axis.plot(fixes[:, 1], fixes[:, 0], "-", color=plots.COLOURS[0], linewidth=1.2, label="surfacings")
-    if evidence.delayed is not None:
-        _, places = delayed.way(evidence.dives, evidence.delayed.delayed)
+    lines: list[tuple[Array, str, int, str]] = [(fixes, "-", 0, "surfacings")]
+    if made.along is not None:
+        lines = [(made.along.true, "-", 1, "glider"), (made.along.learnt, "--", 0, "learnt")]
+    elif currents is not None:
+        lines.append((delayed.way(made.dives, currents)[1], ":", 3, "delayed mode"))
+    if made.along is None:
+        lines.append((led[np.isfinite(led).all(axis=1)], "x", 1, "by the estimate"))
+    for places, style, colour, label in lines:
         axis.plot(
-            places[:, 1], places[:, 0], "-", color=plots.COLOURS[3], linewidth=0.7, label="delayed mode"
+            places[:, 1], places[:, 0], style, color=plots.COLOURS[colour], lw=1.1, markersize=3, label=label
         )
-    good = np.isfinite(led).all(axis=1)
-    axis.plot(led[good, 1], led[good, 0], "x", color=plots.COLOURS[1], markersize=4, label="by the estimate")
-    if len(evidence.centres):
-        c = evidence.centres
+    if len(made.centres):
+        c = made.centres
         axis.plot(c[:, 1], c[:, 0], "o", color=plots.COLOURS[2], markersize=5, label="basis functions")
         for centre in c:
-            ring = np.array([from_plane(evidence.width * np.array(way), *centre) for way in _RING])
+            ring = np.array([from_plane(width * np.array(way), *centre) for way in _RING])
             axis.plot(ring[:, 1], ring[:, 0], ":", color=plots.COLOURS[2], linewidth=0.8)
     middle = float(np.mean(fixes[:, 0])) if len(fixes) else 0.0
     axis.set_aspect(1 / max(np.cos(np.radians(middle)), 0.1), adjustable="datalim")
     axis.set(xlabel="longitude (degrees)", ylabel="latitude (degrees)")
-    axis.legend(fontsize=8, frameon=False)
+    axis.ticklabel_format(useOffset=False)
+    axis.locator_params(axis="x", nbins=6)
+    _coast(axis)
+    figure.legend(loc="outside upper left", ncols=4, fontsize=8, frameon=False)
     return figure
+
+
+def _coast(axis: Any) -> None:
+    """Land in the part of the map that is shown."""
+    (west, east), (south, north) = axis.get_xlim(), axis.get_ylim()
+    high, wide = north - south, east - west  # the equal scale widens what is shown when it is drawn
+    box = coast.Box(south - high, north + high, west - wide, east + wide)
+    land = plots.library().collections.PolyCollection(
+        list(coast.rings_in(coast.world(), box)), color="0.8", linewidth=0, zorder=0
+    )
+    axis.add_collection(land, autolim=False)
 
 
 def write_numbers(path: Path, evidence: Evidence, made: Sequence[Panel]) -> None:
@@ -175,20 +252,27 @@ def write_numbers(path: Path, evidence: Evidence, made: Sequence[Panel]) -> None
     try:
         with netCDF4.Dataset(path, "w") as data:
             data.setncatts({"Conventions": "CF-1.8", "source": f"gliderwatch {__version__}"})
-            _places(data.createGroup("track"), evidence)
+            _places(data.createGroup("track"), evidence.best, evidence)
+            if evidence.online is not None and evidence.online is not evidence.best:
+                _places(data.createGroup("track_as_sent"), evidence.online, None)
             for panel in made:
                 _panel(data.createGroup(_word(panel.name)), panel)
     except (OSError, RuntimeError) as error:
         raise GliderwatchError(f"{path} cannot be written: {error}") from None
 
 
-def _places(group: netCDF4.Group, evidence: Evidence) -> None:
-    group.setncatts({"basis_function_width": evidence.width, "basis_function_width_units": "m"})
-    fixes, led = track(evidence)
-    lines = {"surfacing": fixes, "estimate": led, "basis_function": evidence.centres}
-    times = {"surfacing": _fixed(evidence)}
-    if evidence.delayed is not None:
-        times["delayed"], lines["delayed"] = delayed.way(evidence.dives, evidence.delayed.delayed)
+def _places(group: netCDF4.Group, made: Replayed, evidence: Evidence | None) -> None:
+    """Where the glider was and the estimate led; with the `evidence` also the way in delayed mode."""
+    fixes, led = track(made.assessments)
+    lines = {"surfacing": fixes, "estimate": led, "basis_function": made.centres}
+    times = {"surfacing": _fixed(made.assessments)}
+    if made.along is not None:
+        lines |= {"glider": made.along.true, "learnt": made.along.learnt}
+        times |= {"glider": made.along.t, "learnt": made.along.t}
+    if evidence is not None:
+        group.setncatts({"basis_function_width": evidence.width, "basis_function_width_units": "m"})
+        if evidence.delayed is not None:
+            times["delayed"], lines["delayed"] = delayed.way(made.dives, evidence.delayed.delayed)
     for name, values in lines.items():
         group.createDimension(name, len(values))
         for i, (axis, unit) in enumerate((("lat", "degrees_north"), ("lon", "degrees_east"))):

@@ -4,41 +4,39 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from multiprocessing.util import Finalize
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
+from gliderwatch.archive.along import Along, along
 from gliderwatch.archive.delayed import losses, mean_currents
+from gliderwatch.archive.difference import Difference, Found, compare
 from gliderwatch.archive.missions import Mission, is_full
 from gliderwatch.archive.spells import Spell, spells
 from gliderwatch.config import load
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.model import Array, Assessment, Dive, Incident, SegmentId, readonly
+from gliderwatch.model import Array, Assessment, Dive, Incident, SegmentId
+from gliderwatch.params import GliderParams
 from gliderwatch.score.graft import navigate
 from gliderwatch.score.grid import configured, settings_of
 from gliderwatch.score.work import version
 from gliderwatch.sea.gauss_markov import FlowParams
 from gliderwatch.sea.smoother import Delayed, MeanCurrent, smooth
 from gliderwatch.service.replay import Request, cache_folders, caches_in, replay
+from gliderwatch.service.transaction import FileOutcome
+from gliderwatch.slocum.decode import Decoder
 from gliderwatch.slocum.folders import is_cache
 
 MONTH = 30 * 86400.0
-SAME = 600.0
-"""s: dives of full files and of files as sent that begin so near to each other are one dive."""
-
-
-@dataclass(frozen=True, slots=True)
-class Found:
-    """An incident: its ``kind``, ``since`` (s, the first dive in it), ``opened_at`` (s, the surfacing at
-    which a pilot would have known) and ``cleared_at`` (s, None: open at the end)."""
-
-    kind: str
-    since: float
-    opened_at: float
-    cleared_at: float | None
+ASKED = 10.0
+"""s from the last sample of a segment to the first byte of its file, in a call that was seen."""
+RATE = 100.0
+"""Bytes a second by Iridium, as a glider itself reckons: "1800 secs, representing 180 KB"."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,18 +62,6 @@ class Judged:
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
-    """What full files show otherwise than those that were sent: ``dives`` that both have, root mean square of
-    the difference of ``speed`` and of a component of the ``current`` (m/s, None: no dive has both), and how
-    much later (h) each incident of the full files was opened by those sent (None: never)."""
-
-    dives: int
-    speed: float | None
-    current: float | None
-    delays: tuple[tuple[str, float | None], ...]
-
-
-@dataclass(frozen=True, slots=True)
 class Hindcast:
     """What came of a mission: by files as sent (``online``), by full ones (``full``), their ``difference``.
 
@@ -93,40 +79,57 @@ class Hindcast:
 
 
 @dataclass(frozen=True, slots=True)
+class Replayed:
+    """A mission by one kind of its files: its ``assessments``, its ``dives``, what they come to, the places
+    (degrees, (n, 2)) of the basis functions of the papers' law, and that law ``along`` the track (None:
+    another estimator)."""
+
+    assessments: tuple[Assessment, ...]
+    dives: tuple[Dive, ...]
+    judged: Judged
+    centres: Array
+    along: Along | None
+
+
+@dataclass(frozen=True, slots=True)
 class Evidence:
-    """What a report draws: assessments by each kind of files, the currents in delayed mode, those measured,
-    the ``dives`` that they are of, the places (degrees, (n, 2)) of the basis functions of the papers' law
-    with their ``width`` (m), and what was measured around the flags.
+    """What a report draws: what the replays by each kind of files left, the currents in delayed mode, those
+    measured, the ``width`` (m) of a basis function, and what was measured around the flags.
     """
 
-    online: tuple[Assessment, ...]
-    full: tuple[Assessment, ...]
+    online: Replayed | None
+    full: Replayed | None
     delayed: Delayed | None
     measured: tuple[MeanCurrent, ...]
-    dives: tuple[Dive, ...]
-    centres: Array
     width: float
     spells: tuple[Spell, ...]
 
     @property
-    def best(self) -> tuple[Assessment, ...]:
+    def best(self) -> Replayed:
         """By full files where they are there, else as sent."""
-        return self.full or self.online
+        best = self.full or self.online
+        assert best is not None
+        return best
 
 
 @dataclass(frozen=True, slots=True)
 class Replays:
-    """What the replays of a mission left: by kind of files (`online`, `full`) the assessments and what they
-    come to, its ``dives``, the places of the basis functions (degrees, (n, 2)) and their width
-    (m), what was measured around the flags by the fullest files, the estimator."""
+    """What the replays of a mission left, by each kind of files; the width (m) of a basis function, what was
+    measured around the flags by the fullest files, the estimator."""
 
-    assessed: dict[str, tuple[Assessment, ...]]
-    judged: dict[str, Judged]
-    dives: list[Dive]
-    centres: Array
+    online: Replayed | None
+    full: Replayed | None
     width: float
     spells: tuple[Spell, ...]
     estimator: str
+
+
+@cache
+def _decoder() -> Decoder:
+    """The decoder of this process, for all missions that it works on: to start one takes half a second."""
+    made = Decoder(())
+    Finalize(None, made.close, exitpriority=10)
+    return made
 
 
 def replays(
@@ -137,60 +140,96 @@ def replays(
     `estimator` is `joint`, `adaptive`, or `adaptive:PRESET`; where `settings` names a configuration, what it
     says of the glider counts instead.
     """
-    assessed: dict[str, tuple[Assessment, ...]] = {"online": (), "full": ()}
-    judged = dict[str, Judged]()
-    dives, centres, around = list[Dive](), readonly(np.empty((0, 2))), tuple[Spell, ...]()
     config = configured(mission.glider, settings_of(estimator)) if settings is None else load(settings)
+    params = config.glider(mission.glider)
     caches = sorted({path.parent for path in folder.rglob("*") if is_cache(path.name)})
     caches += caches_in(folder.resolve().parent)
+    made, around = dict[str, Replayed](), tuple[Spell, ...]()
     for kind, wanted in (("online", False), ("full", True)):
         chosen = tuple(path for path in files if is_full(path) is wanted)
         if not chosen:
             continue
         request = Request(chosen, tuple(caches), config, mission.glider, out / kind)
-        store = replay(request).store
-        assessed[kind] = tuple(store.assessments(mission.glider))
-        judged[kind] = judge(assessed[kind], store.incidents(mission.glider))
-        segments = (store.segments.get(identity) for identity in store.segments.of(mission.glider))
-        dives = navigate(segments) or dives
-        newest, _ = store.segments.resume(SegmentId(float("inf"), mission.glider, ""))
-        centres = newest.memory.estimate.learner.centres
-        around = spells(assessed[kind], chosen, cache_folders(request))
-        store.close()
-    params = config.glider(mission.glider)
+        one, incidents = _replayed(request, mission.glider, params)
+        if wanted or not mission.full:
+            around = spells(one.assessments, incidents, chosen, cache_folders(request), _decoder())
+        made[kind] = with_onsets(one, around) if wanted else one
     used = estimator if settings is None else params.estimator
-    return Replays(assessed, judged, dives, centres, params.learner.sigma, around, used)
+    return Replays(made.get("online"), made.get("full"), params.learner.sigma, around, used)
+
+
+def _replayed(request: Request, glider: str, params: GliderParams) -> tuple[Replayed, tuple[Incident, ...]]:
+    """A mission by the files of a request, and its incidents."""
+    reports = dict[str, FileOutcome]()
+
+    def on_file(outcome: FileOutcome) -> None:
+        for alert in outcome.alerts:
+            reports.setdefault(alert.incident, outcome)
+
+    report = replay(request, on_file=on_file, decoder=_decoder())
+    store = report.store
+    segments = [store.segments.get(identity) for identity in store.segments.of(glider)]
+    assessments, incidents = tuple(store.assessments(glider)), tuple(store.incidents(glider))
+    ends = {segment.id.name: segment.last_t for segment in segments}
+    newest, _ = store.segments.resume(SegmentId(float("inf"), glider, ""))
+    store.close()
+    dives = tuple(navigate(segments))
+    law = along(dives, params) if params.estimator == "adaptive" else None
+    found = tuple(_found(one, law, _on_shore(reports.get(one.id), ends)) for one in incidents)
+    centres = newest.memory.estimate.learner.centres
+    return Replayed(assessments, dives, judge(assessments, found), centres, law), incidents
+
+
+def _found(incident: Incident, law: Along | None, on_shore: float | None) -> Found:
+    out = None if law is None else law.since_out(incident.opened_at)
+    return Found(
+        incident.kind.value, incident.since, incident.opened_at, incident.cleared_at, on_shore, out, None
+    )
+
+
+def _on_shore(report: FileOutcome | None, ends: Mapping[str, float]) -> float | None:
+    """When the file was on shore (s) that made it known: after the call in which it was sent."""
+    if report is None or report.file.segment not in ends:
+        return None
+    return ends[report.file.segment] + ASKED + report.file.size / RATE
+
+
+def with_onsets(one: Replayed, around: Iterable[Spell]) -> Replayed:
+    """The same with the onset of each incident that was found in the samples around it."""
+    onsets = {spell.since: spell.onset for spell in around}
+    incidents = tuple(replace(found, onset=onsets.get(found.since)) for found in one.judged.incidents)
+    return replace(one, judged=replace(one.judged, incidents=incidents))
 
 
 def hindcast(mission: Mission, made: Replays) -> tuple[Hindcast, Evidence]:
     """What the replays of a mission come to. Raises GliderwatchError where nothing could be judged."""
-    assessed, judged = made.assessed, made.judged
-    measured = mean_currents(made.dives, losses(assessed["full"] or assessed["online"]))
-    if not any(assessed.values()):
+    best = made.full if made.full is not None and made.full.assessments else made.online
+    if best is None or not best.assessments:
         raise GliderwatchError(
             f"{mission.place}: no dive of {mission.glider} could be judged: see why by "
             f"gliderwatch run --replay {mission.place}"
         )
+    measured = mean_currents(best.dives, losses(best.assessments))
     delayed = smooth(measured, FlowParams()) if len(measured) > 1 else None
-    both = "online" in judged and "full" in judged
     found = Hindcast(
         mission.name,
         mission.glider,
         made.estimator,
-        judged.get("online"),
-        judged.get("full"),
-        _difference(assessed, judged) if both else None,
+        None if made.online is None else made.online.judged,
+        None if made.full is None else made.full.judged,
+        None if made.full is None or made.online is None else _difference(made.full, made.online),
         None if delayed is None else float(np.median(delayed.near_real_time.sigma)),
         None if delayed is None else float(np.median(delayed.delayed.sigma)),
     )
-    online, full = assessed["online"], assessed["full"]
-    dives = tuple(made.dives)
-    return found, Evidence(
-        online, full, delayed, tuple(measured), dives, made.centres, made.width, made.spells
-    )
+    full = made.full if best is made.full else None
+    return found, Evidence(made.online, full, delayed, tuple(measured), made.width, made.spells)
 
 
-def judge(dives: Sequence[Assessment], incidents: Iterable[Incident]) -> Judged:
+def _difference(full: Replayed, online: Replayed) -> Difference:
+    return compare(full.assessments, online.assessments, full.judged.incidents, online.judged.incidents)
+
+
+def judge(dives: Sequence[Assessment], incidents: tuple[Found, ...]) -> Judged:
     """The dives of a mission, counted."""
     flags = Counter("none" if dive.flag is None else str(dive.flag) for dive in dives)
     speeds = [dive.speed for dive in dives if dive.speed is not None]
@@ -202,56 +241,8 @@ def judge(dives: Sequence[Assessment], incidents: Iterable[Incident]) -> Judged:
         dives[-1].t_surface if dives else 0.0,
         float(np.median(speeds)) if speeds else None,
         float(np.median(flows)) if flows else None,
-        tuple(Found(i.kind.value, i.since, i.opened_at, i.cleared_at) for i in incidents),
+        incidents,
     )
-
-
-def _difference(assessed: dict[str, tuple[Assessment, ...]], judged: dict[str, Judged]) -> Difference:
-    pairs = same_dives(assessed["full"], assessed["online"])
-    speed = [a.speed - b.speed for a, b in pairs if a.speed is not None and b.speed is not None]
-    current = [
-        x - y
-        for a, b in pairs
-        for x, y in ((a.flow_u, b.flow_u), (a.flow_v, b.flow_v))
-        if x is not None and y is not None
-    ]
-    return Difference(
-        len(pairs), _rms(speed), _rms(current), delays(judged["full"].incidents, judged["online"].incidents)
-    )
-
-
-def same_dives(
-    some: Sequence[Assessment], others: Sequence[Assessment]
-) -> list[tuple[Assessment, Assessment]]:
-    """The dives that are in both, each with itself."""
-    starts = np.array([dive.t_dive for dive in others])
-    out = []
-    for dive in some:
-        if (
-            len(starts)
-            and abs(starts[i := int(np.argmin(np.abs(starts - dive.t_dive)))] - dive.t_dive) < SAME
-        ):
-            out.append((dive, others[i]))
-    return out
-
-
-def delays(full: Sequence[Found], online: Sequence[Found]) -> tuple[tuple[str, float | None], ...]:
-    """Of each incident by full files its kind, and how much later (h) files as sent opened one of that kind
-    which lasted at the same time; None: they did not."""
-
-    def later(one: Found) -> float | None:
-        same = [o for o in online if o.kind == one.kind and o.since <= _end(one) and _end(o) >= one.since]
-        return min((o.opened_at - one.opened_at) / 3600 for o in same) if same else None
-
-    return tuple((one.kind, later(one)) for one in full)
-
-
-def _end(one: Found) -> float:
-    return np.inf if one.cleared_at is None else one.cleared_at
-
-
-def _rms(values: Sequence[float]) -> float | None:
-    return float(np.sqrt(np.mean(np.square(values)))) if values else None
 
 
 def fingerprint(mission: Mission, files: Iterable[Path], estimator: str, chosen: str) -> str:

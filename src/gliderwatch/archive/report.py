@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -11,8 +12,10 @@ from markupsafe import Markup
 
 from gliderwatch import __version__
 from gliderwatch.archive import drawing, hindcast
+from gliderwatch.archive.difference import Delay, Found
 from gliderwatch.archive.hindcast import Evidence, Hindcast, Judged
 from gliderwatch.archive.missions import Mission, local
+from gliderwatch.archive.onset import Onset
 from gliderwatch.errors import GliderwatchError
 from gliderwatch.export import netcdf
 from gliderwatch.figures import panel_svg, plots
@@ -53,13 +56,9 @@ def make_in(root: Path, estimator: str, settings: Path | None, mission: Mission)
 def write(out: Path, found: Hindcast, evidence: Evidence) -> None:
     """Write page, paper, numbers and the result itself."""
     made = drawing.panels(evidence)
-    track = drawing.track_figure(evidence)
+    maps = drawing.track_figures(evidence)
     pictures = [
-        (
-            drawing.TRACK,
-            "Where it surfaced, and where speed and flow as estimated would have led it.",
-            Markup(plots.as_svg(track)),
-        ),
+        *((name, shows, Markup(plots.as_svg(figure))) for name, shows, figure in maps),
         *((panel.name, panel.shows, Markup(panel_svg.svg(panel))) for panel in made),
     ]
     page = _page().render(
@@ -70,12 +69,15 @@ def write(out: Path, found: Hindcast, evidence: Evidence) -> None:
         version=__version__,
     )
     (out / PAGE).write_text(page, encoding="utf-8")
-    paper = [_cover(found), track, *(plots.page_figure(panel) for panel in made)]
+    for name, _, figure in maps:
+        figure.suptitle(name, x=0.02, ha="left", fontsize=10, fontweight="bold")
+    paper = [_cover(found), *(figure for *_, figure in maps), *map(plots.page_figure, made)]
     plots.write_pdf(out / PAPER, f"{found.name}: hindcast", paper)
     drawing.write_numbers(out / NUMBERS, evidence, made)
-    placed = [d for d in evidence.best if d.lat is not None]
+    assessments = evidence.best.assessments
+    placed = [d for d in assessments if d.lat is not None]
     if placed:
-        netcdf.write(out / "dives.nc", found.glider, evidence.best, placed[-1].t_surface)
+        netcdf.write(out / "dives.nc", found.glider, assessments, placed[-1].t_surface)
     partial = out / f"{RESULT}.part"
     partial.write_bytes(msgspec.json.format(msgspec.json.encode(found), indent=2))
     partial.replace(out / RESULT)
@@ -93,23 +95,50 @@ def lines(found: Hindcast) -> list[str]:
         flags = ", ".join(f"{flag}: {n}" for flag, n in judged.flags.items())
         out.append(f"{words}: {judged.dives} dives, {utc(judged.start)} to {utc(judged.end)}; flags {flags}")
         for one in judged.incidents:
-            end = "still open at the end" if one.cleared_at is None else f"until {utc(one.cleared_at)}"
-            out.append(f"  {incident(one.kind)} since {utc(one.since)}, seen {utc(one.opened_at)}, {end}")
+            out += [f"  {incident(one.kind)}", *(f"    {line}" for line in _when(one))]
     if found.difference is not None:
         d = found.difference
         out.append(
             f"both kinds of files: {d.dives} dives, differ by {_cm(d.speed)} in speed, "
             f"{_cm(d.current)} in a component of the current"
         )
-        for kind, late in d.delays:
-            when = "not at all" if late is None else f"{late:+.1f} h later"
-            out.append(f"  {incident(kind)}: by files as sent {when}")
+        out += [f"  {delay(one)}" for one in d.delays]
     if found.delayed is not None:
         out.append(
             f"instantaneous current: standard error {_cm(found.near_real_time)} near real time, "
             f"{_cm(found.delayed)} in delayed mode"
         )
     return out
+
+
+def _when(one: Found) -> Iterator[str]:
+    """When an incident began, was seen and ended, as far as it is known."""
+    if one.onset is not None:
+        yield f"began {onset(one.onset)}"
+    if one.out is not None:
+        yield f"speed along the track out of its range since {utc(one.out)}"
+    on_shore = "" if one.on_shore is None else f", on shore {utc(one.on_shore)}"
+    end = "open at the end" if one.cleared_at is None else f"until {utc(one.cleared_at)}"
+    yield f"in the dive from {utc(one.since)}, seen at the surfacing {utc(one.opened_at)}{on_shore}, {end}"
+
+
+def onset(found: Onset) -> str:
+    """When something began, and what shows it."""
+    minutes = (found.latest - found.earliest) / 60
+    return f"{utc(found.t)} (within {minutes:.0f} min): {'; '.join(step.words for step in found.steps)}"
+
+
+def delay(one: Delay) -> str:
+    """How much later an incident by full files was found by those that were sent."""
+    name = incident(one.full.kind)
+    if one.sent is None:
+        already = "" if one.already is None else f"; they had one open since {utc(one.already)}"
+        return f"{name} since {utc(one.full.since)}: not by files as sent{already}"
+    began = "it began" if one.full.onset is not None else "the dive began in which it is first seen"
+    return (
+        f"{name} since {utc(one.full.since)}: by files as sent {one.later:+.1f} h later; known on shore "
+        f"{one.after:.1f} h after {began}"
+    )
 
 
 def incident(kind: str) -> str:
@@ -131,5 +160,5 @@ def _cover(found: Hindcast) -> object:
 @cache
 def _page() -> Template:
     made = environment(PackageLoader("gliderwatch.archive"))
-    made.filters |= {"utc": utc, "incident": incident, "cm": _cm}
+    made.filters |= {"utc": utc, "incident": incident, "cm": _cm, "onset": onset, "delay": delay}
     return made.get_template("report.html")

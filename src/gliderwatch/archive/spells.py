@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from gliderwatch.archive.onset import Onset, onset
 from gliderwatch.errors import GliderwatchError
-from gliderwatch.model import Assessment, Flag, Segment, Series, readonly
+from gliderwatch.model import Assessment, Flag, Incident, Segment, Series, readonly
 from gliderwatch.slocum.decode import Decoder
 from gliderwatch.slocum.header import read_header
 
@@ -35,24 +36,32 @@ QUANTITIES = {
 @dataclass(frozen=True, slots=True)
 class Spell:
     """Dives with a ``flag`` in a row, ``since`` (s) the first one began; ``samples`` (SI) by the names of
-    `QUANTITIES`, as the glider measured them from a day before to a day after."""
+    `QUANTITIES`, as the glider measured them from a day before to a day after; when they show that it began
+    (None: they show no step)."""
 
     since: float
     flag: Flag
     samples: Mapping[str, Series]
+    onset: Onset | None
 
 
-def spells(dives: Sequence[Assessment], files: Iterable[Path], caches: Sequence[Path]) -> tuple[Spell, ...]:
+def spells(
+    dives: Sequence[Assessment],
+    incidents: Iterable[Incident],
+    files: Iterable[Path],
+    caches: Sequence[Path],
+    decoder: Decoder,
+) -> tuple[Spell, ...]:
     """The spells of a mission with what its `files` hold around each, whose lists are in `caches`.
 
     They are read again, as what was judged keeps a sample in half a minute.
     """
-    firsts = first_dives(dives)
+    firsts = first_dives(dives, {one.since: one.opened_at for one in incidents})
     if not firsts:
         return ()
-    opened = sorted(_opened(files, firsts[0].glider))
-    with Decoder(caches) as decoder:
-        return tuple(_spell(first, opened, decoder) for first in firsts)
+    opened = sorted(_opened(files, firsts[0][0].glider))
+    decoder.cache_folders, decoder.science = tuple(caches), None
+    return tuple(_spell(*first, opened, decoder) for first in firsts)
 
 
 def _opened(files: Iterable[Path], glider: str) -> Iterator[tuple[float, Path]]:
@@ -64,27 +73,35 @@ def _opened(files: Iterable[Path], glider: str) -> Iterator[tuple[float, Path]]:
                 yield header.id.opened_at, path
 
 
-def first_dives(dives: Sequence[Assessment]) -> list[Assessment]:
-    """The first dive of each spell of flags, `MOST` at the most."""
-    out, last = list[Assessment](), -np.inf
+def first_dives(dives: Sequence[Assessment], opened: Mapping[float, float]) -> list[tuple[Assessment, float]]:
+    """The first dive of each incident and of each other spell of flags, `MOST` at the most and incidents
+    first, with the surfacing (s) at which it was seen; `opened` are those of the incidents by the start of
+    their first dive."""
+    out, last = list[tuple[Assessment, float]](), -np.inf
     for dive in dives:
-        if dive.flag in (Flag.ANOMALY, Flag.FALSE_ALARM):
-            if dive.t_dive - last > BESIDE:
-                out.append(dive)
-            last = dive.t_dive
-    return out[:MOST]
+        if dive.flag not in (Flag.ANOMALY, Flag.FALSE_ALARM):
+            continue
+        before = out[-1][0].t_dive if out else -np.inf
+        if dive.t_dive in opened and before not in opened and dive.t_dive - before < BESIDE:
+            out.pop()  # the incident that follows shows the same hours
+        if dive.t_dive - last > BESIDE or dive.t_dive in opened:
+            out.append((dive, opened.get(dive.t_dive, dive.t_surface)))
+        last = dive.t_dive
+    shown = sorted(out, key=lambda one: one[0].t_dive not in opened)[:MOST]
+    return sorted(shown, key=lambda one: one[0].t_dive)
 
 
-def _spell(first: Assessment, opened: Sequence[tuple[float, Path]], decoder: Decoder) -> Spell:
-    start, end = first.t_dive - BESIDE, first.t_dive + BESIDE
+def _spell(first: Assessment, until: float, opened: Sequence[tuple[float, Path]], decoder: Decoder) -> Spell:
+    start, end = first.t_dive - BESIDE, max(first.t_dive + BESIDE, until)
     ends = [*(t for t, _ in opened[1:]), np.inf]
-    near = [path for (t, path), until in zip(opened, ends, strict=True) if until > start and t < end]
+    near = [path for (t, path), after in zip(opened, ends, strict=True) if after > start and t < end]
     segments = [found for _, found in decoder.map(near) if isinstance(found, Segment)]
     found = {name: _most(segments, names).between(start, end) for name, names in QUANTITIES.items()}
     return Spell(
         first.t_dive,
         Flag(first.flag or 0),
         {name: thinned(each) for name, each in found.items() if len(each)},
+        onset(found, until),
     )
 
 

@@ -19,7 +19,7 @@ from gliderwatch.estimation.unassessed import Reference, unassessed
 from gliderwatch.model import Array, Assessment, Current, Dive, Fix, Flag, Track, readonly
 from gliderwatch.navigation.geodesy import from_plane, to_plane
 from gliderwatch.navigation.track import closure
-from gliderwatch.papers.basis import new_centres, phi
+from gliderwatch.papers.basis import Basis, new_centres, phi
 from gliderwatch.papers.flags import FlowMaxima, flag, p_e, update
 from gliderwatch.papers.learner import AdaptiveInfo, AdaptiveParams, AdaptiveState, advance, init, with_basis
 from gliderwatch.params import GliderParams
@@ -67,23 +67,20 @@ def step(
     takes the place of the dive's current as the reference. A dive that cannot be used leaves the estimate
     as it is and gets an assessment without a flag, with the reason.
     """
-    if dive.track is None or dive.start is None or dive.end is None:
+    ready = prepared(state, dive, params)
+    if ready is None:
         return state, unassessed(dive, params, digest, dive.reason)
-    gains = learner_params(params)
-    state = _begin(state, dive, dive.start, params)
-    params = _with_range(state, dive, params)
-    learner, places, centres = _covering(state, dive.track, dive.start, params)
-    t, basis = dive.track.t - state.begun, gains.basis(centres)
-    if not learner.flown and dive.current is not None:
-        learner = _with_flow(learner, dive.current, phi(dive.track.x[0], t[0], basis))
-    before = learner
-    learner, info = advance(learner, t, dive.track.x, dive.track.heading, basis, gains)
+    state, params, before = ready.state, ready.params, ready.learner
+    assert dive.track is not None
+    learner, info = advance(
+        before, ready.t, dive.track.x, dive.track.heading, ready.basis, learner_params(params)
+    )
     reference, earlier = (other.current, False) if other is not None else _reference(state, dive)
     maxima = update(state.maxima, info.flow_speed_max, hypot(reference.u, reference.v) if reference else 0.0)
     state = replace(
         state,
         learner=learner,
-        centres=places,
+        centres=ready.centres,
         maxima=maxima,
         end=dive.end,
         warm=state.warm + learner.flown - before.flown,
@@ -98,6 +95,34 @@ def step(
         normal = learn(state.normal, info.speed, setting(dive.features), duration, RangeParams())
         state = replace(state, normal=normal)
     return state, replace(judged, evidence={**judged.evidence, **_past(before)})
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """All that the learner needs for a dive: the ``state`` and the ``params`` (with the range of speed that
+    was learnt) before it, its ``learner`` with functions that cover the track, their ``centres`` (degrees,
+    (N, 2)) and the ``basis`` in the plane of the dive, and times ``t`` (s) of the track since the state
+    began."""
+
+    state: Learner
+    params: GliderParams
+    learner: AdaptiveState
+    centres: Array
+    basis: Basis
+    t: Array
+
+
+def prepared(state: Learner, dive: Dive, params: GliderParams) -> Prepared | None:
+    """What the learner goes through a dive with; None where the dive has no track."""
+    if dive.track is None or dive.start is None or dive.end is None:
+        return None
+    state = _begin(state, dive, dive.start, params)
+    params = _with_range(state, dive, params)
+    learner, places, centres = _covering(state, dive.track, dive.start, params)
+    t, basis = dive.track.t - state.begun, learner_params(params).basis(centres)
+    if not learner.flown and dive.current is not None:
+        learner = _with_flow(learner, dive.current, phi(dive.track.x[0], t[0], basis))
+    return Prepared(state, params, learner, places, basis, t)
 
 
 def learnt_flow(state: Learner, dive: Dive, params: GliderParams) -> Array | None:

@@ -7,7 +7,7 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
@@ -98,8 +98,10 @@ def replay(
     on_total: Callable[[int], None] = lambda n: None,
     on_file: Callable[[transaction.FileOutcome], None] = lambda outcome: None,
     workers: int = 1,
+    decoder: Decoder | None = None,
 ) -> Report:
-    """Replay the files of some folders in the order of time. Raises GliderwatchError where there are none."""
+    """Replay the files of some folders in the order of time, decoded by `decoder` (None: one of its own with
+    so many `workers`). Raises GliderwatchError where there are none."""
     files = find_files(request.folders)
     has_logs = request.config is None or request.config.dockserver.logs
     logs = find_logs(request.folders) if has_logs else []
@@ -119,11 +121,13 @@ def replay(
             report.coming = _coming(jobs, calls)
             order = ReplayOrder(jobs)
             science = None if request.config is None else science_of(request.config)
-            for decoded in _decoded(jobs, [*cache_folders(request), lists.folder], workers, science):
-                for job, sent in order.after(decoded):
-                    while calls and calls[0].sent <= sent:
-                        _process_log(calls.popleft(), report, request, routing, on_file)
-                    _process(job, sent, report, request, routing, on_file)
+            caches = [*cache_folders(request), lists.folder]
+            with Decoder((), max_workers=workers) if decoder is None else nullcontext(decoder) as hands:
+                for decoded in _decoded(jobs, hands, caches, science):
+                    for job, sent in order.after(decoded):
+                        while calls and calls[0].sent <= sent:
+                            _process_log(calls.popleft(), report, request, routing, on_file)
+                        _process(job, sent, report, request, routing, on_file)
             for call in calls:
                 _process_log(call, report, request, routing, on_file)
         if request.out is not None:
@@ -266,15 +270,14 @@ def _check_glider(request: Request, jobs: Sequence[Job], calls: Iterable[Log], s
 
 
 def _decoded(
-    jobs: Sequence[Job], caches: Sequence[Path], workers: int, science: Sequence[str] | None
+    jobs: Sequence[Job], decoder: Decoder, caches: Sequence[Path], science: Sequence[str] | None
 ) -> Iterator[Job]:
-    with Decoder(caches, max_workers=workers) as decoder:
-        decoder.science = science
-        results = decoder.map([Path(job.file.path) for job in jobs if job.result is None])
-        for job in jobs:
-            if job.result is None:
-                job.result = next(results)[1]
-            yield job
+    decoder.cache_folders, decoder.science = tuple(caches), science
+    results = decoder.map([Path(job.file.path) for job in jobs if job.result is None])
+    for job in jobs:
+        if job.result is None:
+            job.result = next(results)[1]
+        yield job
 
 
 def _process(
