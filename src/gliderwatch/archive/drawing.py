@@ -21,8 +21,9 @@ from gliderwatch.export.netcdf import SINCE
 from gliderwatch.figures import coast, dives, plots
 from gliderwatch.figures.plots import Line, Panel
 from gliderwatch.messages.formatting import utc
-from gliderwatch.model import Array, Assessment
+from gliderwatch.model import Array
 from gliderwatch.navigation.geodesy import displacement, from_plane
+from gliderwatch.navigation.track import mean_heading
 from gliderwatch.sea.smoother import Currents
 
 TRACK = "Track"
@@ -50,13 +51,13 @@ def _has_values(panel: Panel) -> bool:
 
 
 def _off(made: Replayed) -> Panel:
-    fixes, led = track(made.assessments)
+    t, fixes, led = track(made)
     off = np.array([np.hypot(*displacement(*a, *b)) for a, b in zip(led, fixes, strict=True)])
     shows = (
-        "How far from each surfacing the estimated speed and flow would have led the glider, from the "
-        "surfacing before and on the course that it made."
+        "How far from each surfacing speed and flow as estimated would have led the glider, from the fix "
+        "before the dive and on the headings that it measured."
     )
-    lines = (Line("of the dive", _fixed(made.assessments), off),)
+    lines = (Line("of the dive", t, off),)
     return Panel("Error of the track", "error (m)", shows, lines, zero=True)
 
 
@@ -164,29 +165,24 @@ def _delayed_speed(evidence: Evidence, found: Currents) -> Panel:
     return Panel("Delayed mode, speed", "speed (m/s)", shows, lines, zero=True)
 
 
-def _fixed(some: Sequence[Assessment]) -> Array:
-    """The times (s) of the surfacings that `track` has."""
-    return np.array([d.t_surface for d in some if d.lat is not None and d.lon is not None])
-
-
-def track(assessments: Sequence[Assessment]) -> tuple[Array, Array]:
-    """Fixes (degrees, (n, 2): latitude, longitude) at the surfacings, and where the estimated speed and flow
-    would have led from the one before ((n, 2), NaN where there is no estimate)."""
-    some = [d for d in assessments if d.lat is not None and d.lon is not None]
-    fixes = np.array([(d.lat, d.lon) for d in some], dtype=float).reshape(-1, 2)
-    led = np.full(fixes.shape, np.nan)
-    for i in range(1, len(some)):
-        one, before = some[i], some[i - 1]
-        if one.speed is None or one.flow_u is None or one.flow_v is None:
+def track(made: Replayed) -> tuple[Array, Array, Array]:
+    """The surfacings: times (s, (n,)), fixes (degrees, (n, 2): latitude, longitude), and where speed and flow
+    as estimated would have led on the headings that were measured, from the fix before ((n, 2), NaN where
+    there is no estimate)."""
+    found = {one.t_dive: one for one in made.assessments if one.speed is not None}
+    rows = list[tuple[float, ...]]()
+    for dive in made.dives:
+        if dive.track is None or dive.start is None or dive.end is None:
             continue
-        drift = np.array([one.flow_u, one.flow_v]) * (one.t_surface - before.t_surface)
-        # The heading as the ground track and the flow have it: the estimate is of speed and flow alone.
-        through = displacement(*fixes[i], *fixes[i - 1]) - drift
-        length = float(np.hypot(*through))
-        if length > 0:
-            way = drift + through / length * one.speed * (one.t_surface - one.t_dive)
-            led[i] = from_plane(way, *fixes[i - 1])
-    return fixes, led
+        one, led = found.get(dive.t_dive), (np.nan, np.nan)
+        if one is not None and one.speed is not None and one.flow_u is not None and one.flow_v is not None:
+            heading, _ = mean_heading(dive.track)
+            ground = np.array([one.flow_u, one.flow_v]) + one.speed * heading
+            way = ground * float(dive.track.t[-1] - dive.track.t[0])
+            led = from_plane(way, dive.start.lat, dive.start.lon)
+        rows.append((dive.end.t, dive.end.lat, dive.end.lon, *map(float, led)))
+    columns = np.array(rows).reshape(-1, 5)
+    return columns[:, 0], columns[:, 1:3], columns[:, 3:]
 
 
 def track_figures(evidence: Evidence) -> list[tuple[str, str, Any]]:
@@ -206,7 +202,7 @@ def track_figures(evidence: Evidence) -> list[tuple[str, str, Any]]:
 
 
 def _map(made: Replayed, width: float, currents: Currents | None) -> Any:
-    fixes, led = track(made.assessments)
+    _, fixes, led = track(made)
     figure = plots.library().figure.Figure(figsize=(5.4, 4.6), layout="constrained")
     axis = figure.add_subplot()
     lines: list[tuple[Array, str, int, str]] = [(fixes, "-", 0, "surfacings")]
@@ -232,7 +228,7 @@ def _map(made: Replayed, width: float, currents: Currents | None) -> Any:
     axis.ticklabel_format(useOffset=False)
     axis.locator_params(axis="x", nbins=6)
     _coast(axis)
-    figure.legend(loc="outside upper left", ncols=4, fontsize=8, frameon=False)
+    figure.legend(loc="outside lower center", ncols=4, fontsize=8, frameon=False)
     return figure
 
 
@@ -263,9 +259,9 @@ def write_numbers(path: Path, evidence: Evidence, made: Sequence[Panel]) -> None
 
 def _places(group: netCDF4.Group, made: Replayed, evidence: Evidence | None) -> None:
     """Where the glider was and the estimate led; with the `evidence` also the way in delayed mode."""
-    fixes, led = track(made.assessments)
+    t, fixes, led = track(made)
     lines = {"surfacing": fixes, "estimate": led, "basis_function": made.centres}
-    times = {"surfacing": _fixed(made.assessments)}
+    times = {"surfacing": t}
     if made.along is not None:
         lines |= {"glider": made.along.true, "learnt": made.along.learnt}
         times |= {"glider": made.along.t, "learnt": made.along.t}

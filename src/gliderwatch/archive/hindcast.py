@@ -195,9 +195,11 @@ def _on_shore(report: FileOutcome | None, ends: Mapping[str, float]) -> float | 
 
 
 def with_onsets(one: Replayed, around: Iterable[Spell]) -> Replayed:
-    """The same with the onset of each incident that was found in the samples around it."""
+    """Full files: with the onset of each incident by the samples around it. They came to shore later."""
     onsets = {spell.since: spell.onset for spell in around}
-    incidents = tuple(replace(found, onset=onsets.get(found.since)) for found in one.judged.incidents)
+    incidents = tuple(
+        replace(found, onset=onsets.get(found.since), on_shore=None) for found in one.judged.incidents
+    )
     return replace(one, judged=replace(one.judged, incidents=incidents))
 
 

@@ -18,6 +18,8 @@ FEWEST = 30
 """Bins before a change, and after it, so that it can be seen."""
 LEAST = 25.0
 """How much likelier (in chi-squared) a step must make the samples than none: five standard errors."""
+STANDS_OUT = 2.0
+"""Standard deviations of what a step leaves, by which it must change a quantity."""
 WITHIN = 4.0
 """So much less likely (in chi-squared) a moment may be than the likeliest one: two standard errors."""
 
@@ -67,7 +69,9 @@ def onset(samples: Mapping[str, Series], until: float) -> Onset | None:
         return None
     rough = sum(_gain(s, times, _noise(s.v)) for s in series.values())
     at = float(times[int(np.argmax(rough))])
-    gains = {name: _gain(s, times, _left(s, at)) for name, s in series.items()}
+    gains = {name: _gain(s, times, _left(s, at)) for name, s in series.items() if _stands_out(s, at)}
+    if not gains:
+        return None
     total = np.asarray(sum(gains.values()))
     best = int(np.argmax(total))
     if total[best] < LEAST:
@@ -76,7 +80,7 @@ def onset(samples: Mapping[str, Series], until: float) -> Onset | None:
     steps = tuple(
         Step(name, float(s.v[s.t < times[best]].mean()), float(s.v[s.t >= times[best]].mean()))
         for name, s in series.items()
-        if gains[name][best] >= LEAST
+        if name in gains and gains[name][best] >= LEAST
     )
     return Onset(float(times[best]) - BIN / 2, float(near[0]) - BIN / 2, float(near[-1]) + BIN / 2, steps)
 
@@ -134,10 +138,23 @@ def _noise(v: Array) -> float:
     return max(float(np.median(np.abs(np.diff(v)))) * 1.05, 1e-6) ** 2 if len(v) > 1 else 1.0
 
 
+def _parts(series: Series, at: float) -> list[Array]:
+    """The values before a time (s), and from then on, each without their mean."""
+    return [p - p.mean() for p in (series.v[series.t < at], series.v[series.t >= at]) if len(p)]
+
+
+def _stands_out(series: Series, at: float) -> bool:
+    """Whether a step is greater than what tide, density of the water and pilot do all the time."""
+    before, after = series.v[series.t < at], series.v[series.t >= at]
+    if len(before) < FEWEST or len(after) < FEWEST:
+        return False
+    spread = float(np.std(np.concatenate(_parts(series, at))))
+    return abs(float(after.mean() - before.mean())) > STANDS_OUT * spread
+
+
 def _left(series: Series, at: float) -> float:
     """The variance of what a step at ``at`` leaves, times how many bins in a row tell the same."""
-    parts = [p - p.mean() for p in (series.v[series.t < at], series.v[series.t >= at]) if len(p)]
-    rest = np.concatenate([np.empty(0), *parts])
+    rest = np.concatenate([np.empty(0), *_parts(series, at)])
     variance = float(np.mean(rest**2)) if len(rest) else 0.0
     if len(rest) < 3 or variance < 1e-12:
         return max(variance, 1e-12)

@@ -134,9 +134,11 @@ def delay(one: Delay) -> str:
     if one.sent is None:
         already = "" if one.already is None else f"; they had one open since {utc(one.already)}"
         return f"{name} since {utc(one.full.since)}: not by files as sent{already}"
+    assert one.later is not None
+    late = f"{one.later:+.1f} h later" if abs(one.later) > 0.05 else "at the same surfacing"
     began = "it began" if one.full.onset is not None else "the dive began in which it is first seen"
     return (
-        f"{name} since {utc(one.full.since)}: by files as sent {one.later:+.1f} h later; known on shore "
+        f"{name} since {utc(one.full.since)}: by files as sent {late}; known on shore "
         f"{one.after:.1f} h after {began}"
     )
 

@@ -14,7 +14,7 @@ from math import ceil, floor, log10
 
 import numpy as np
 
-from gliderwatch.figures.plots import Line, Panel
+from gliderwatch.figures.plots import DENSE, Line, Panel
 from gliderwatch.model import Array
 
 WIDTH, HEIGHT = 340.0, 156.0
@@ -29,7 +29,7 @@ STYLE = """\
 .plot{width:100%;background:var(--card);border-radius:6px;font:11px system-ui,sans-serif}
 .plot text{fill:var(--ink)}.plot .faint{fill:var(--soft)}.plot .grid{stroke:var(--line);fill:none}
 .plot .band{fill:var(--s0);fill-opacity:.16}.plot .s{fill:none;stroke-width:1.6;stroke-linejoin:round}
-.plot .dots{fill:none;stroke-width:4.4;stroke-linecap:round}
+.plot .fine{stroke-width:.4}.plot .dots{fill:none;stroke-width:4.4;stroke-linecap:round}
 .plot .error{fill:none;stroke-width:1;stroke-opacity:.45}
 .s0{stroke:var(--s0)}.s1{stroke:var(--s1);stroke-dasharray:6 3}.s2{stroke:var(--s2);stroke-dasharray:2 3}
 .s3{stroke:var(--s3);stroke-dasharray:8 3 2 3}.dots.s1,.dots.s2,.dots.s3,.error.s1,.error.s2,.error.s3{
@@ -199,7 +199,8 @@ def _line(line: Line, k: int, scale: _Scale) -> Iterator[str]:
         cuts = np.flatnonzero(np.diff(good.astype(int)) != 0) + 1
         runs = [run for run in np.split(np.arange(len(good)), cuts) if good[run[0]]]
         way = "".join(f"M{'L'.join(_points(x[run], y[run]))}" for run in runs)
-        yield f'<path class="s s{k}" d="{way}"/>'
+        kind = "s" if len(x) < DENSE else "s fine"
+        yield f'<path class="{kind} s{k}" d="{way}"/>'
     else:
         way = "".join(f"M{point}h0" for point in _points(x[good], y[good]))
         yield f'<path class="dots s{k}" d="{way}"/>'

@@ -23,6 +23,8 @@ AREA = (0.13, 0.19, 0.85, 0.6)
 """The axes in it: left, bottom, width, height. Fixed: to find the least margins takes as long as the rest."""
 TOP = 0.91
 """Height of its key."""
+DENSE = 500
+"""Values of a line from which on it is drawn thin: one of yos would else be a block of colour."""
 _MARKS = (("^", COLOURS[1]), ("D", COLOURS[4]))
 _ABOUT = ("Date", "Creator", "Format", "Type")
 """What matplotlib would say of itself in an SVG, with the addresses of vocabularies: nothing is."""
@@ -182,7 +184,8 @@ def _line(axis: Any, line: Line, colour: str, dashes: str) -> None:
         ends = np.stack([low, high, np.full(len(t), np.nan)], axis=1).ravel()
         axis.plot(bars, ends, color=colour, alpha=0.4, linewidth=1.2)
     if line.joined:
-        axis.plot(t, line.v, dashes, color=colour, linewidth=1.2, label=line.label)
+        width = 1.2 if len(t) < DENSE else 0.4
+        axis.plot(t, line.v, dashes, color=colour, linewidth=width, label=line.label)
     else:
         axis.plot(t, line.v, "o", color=colour, markersize=3.5, label=line.label)
 
