@@ -17,68 +17,41 @@ from pathlib import Path
 
 import numpy as np
 from common import machine
-from flights import HOUR, SEAS, judged, of, read
+from flights import HOUR, judged, of, read
 
 from gliderwatch.estimation.dive_measurement import observe
 from gliderwatch.forecast.constants import CHI2_COVERED
-from gliderwatch.model import Array, Dive, readonly
+from gliderwatch.model import Array, Dive, Fix
 from gliderwatch.papers import two_stage
 from gliderwatch.papers.two_stage import TwoStageParams
 from gliderwatch.score.graft import navigate
-from gliderwatch.sea import flow_forecast, gauss_markov
-from gliderwatch.sea.flow_forecast import Currents, Parameters, forecasts, learn, predict
-from gliderwatch.sea.gauss_markov import FlowParams
+from gliderwatch.sea.flow_forecast import Currents, learn, predict
 from gliderwatch.sea.tides import Constituent
-from gliderwatch.simulate import ocean
 from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
-from gliderwatch.simulate.ocean import Ellipse, Sea
-from gliderwatch.simulate.scenario import Scenario
+from gliderwatch.simulate.seas import SEAS, sea_mission
 from gliderwatch.store import codec
 
-TIDE = ocean.Constituent
-MORE = {
-    "no tides": Sea(tides=()),
-    "springs and neaps": Sea(
-        tides=(
-            Ellipse(TIDE.M2, 0.25, 0.08, 0.6, 0.4),
-            Ellipse(TIDE.S2, 0.10, 0.03, 0.6, 1.4),
-            Ellipse(TIDE.N2, 0.05, 0.01, 0.6, 2.4),
-            Ellipse(TIDE.K1, 0.10, -0.03, 1.2, 2.0),
-            Ellipse(TIDE.O1, 0.07, -0.03, 1.2, 0.3),
-        ),
-        sigma=0.05,
-    ),
-}
 M2_K1 = (Constituent.M2, Constituent.K1)
-FIXED = Parameters(
-    readonly([0.08]),
-    readonly([30 * HOUR]),
-    readonly([[1e-6 / HOUR] * 2]),
-    readonly([[0.25] * 2]),
-    readonly([each.omega for each in M2_K1]),
-)
-NAMES = ("persistence", "two-stage", "two-stage 119 h", "fixed", "one sea", "residual", "tides", "chosen")
+NAMES = ("persistence", "two-stage", "two-stage 119 h", "foreseen")
 
 
 @dataclass(frozen=True)
 class Seen:
-    """A dive's interval (s), its believed current (m/s) with error, the true one where it is known, and its
-    latitude (degrees)."""
+    """The fixes of a dive, its believed current (m/s) with error, and the true one where it is known."""
 
-    start: float
-    end: float
+    start: Fix
+    end: Fix
     current: Array
     sigma: float
     truth: Array | None
-    lat: float
 
 
 @dataclass(frozen=True)
 class Row:
-    """One dive: error (m/s, (2,)) of each forecast, the chosen one's source, its error squared in standard
-    errors; of the displacement over the dive the error of persistence and of the forecast (m, as over 3 h)
-    and that squared in standard errors."""
+    """One dive: error (m/s, (2,)) of each forecast; of that of the model of the sea its source and its error
+    squared in standard errors; of the displacement over the dive the error of persistence and of the forecast
+    (m, as over 3 h) and that squared in standard errors."""
 
     errors: dict[str, Array]
     source: str
@@ -96,12 +69,12 @@ def seen(dives: Sequence[Dive], truth: dict[float, Array] | None = None) -> list
         assert each.current is not None
         known = truth.get(dive.t_dive) if truth is not None else None
         if truth is None or known is not None:
-            out.append(Seen(each.start, each.end, each.current, each.current_sigma, known, dive.end.lat))
+            out.append(Seen(dive.start, dive.end, each.current, each.current_sigma, known))
     return out
 
 
-def simulated(sea: Sea, seed: int, days: float) -> list[Seen]:
-    mission = simulate(Scenario(seed=seed, days=days, sea=sea))
+def simulated(sea: str, seed: int, days: float) -> list[Seen]:
+    mission = simulate(sea_mission(sea, seed, days=days))
     with tempfile.TemporaryDirectory(prefix="gliderwatch-benchmark-") as folder:
         write_mission(Path(folder) / "gliders", Path(folder) / "cache", mission)
         dives = navigate(read(Path(folder) / "gliders", Path(folder) / "cache"))
@@ -117,11 +90,11 @@ class TwoStage:
 
     def __call__(self, each: Seen) -> Array | None:
         told = (
-            two_stage.forecast(self.state, each.start, each.end, self.params)
+            two_stage.forecast(self.state, each.start.t, each.end.t, self.params)
             if self.state is not None
             else None
         )
-        step = (each.start, each.end, each.current)
+        step = (each.start.t, each.end.t, each.current)
         self.state = (
             two_stage.learn(self.state, *step, 0.02, self.params)
             if self.state is not None
@@ -130,63 +103,29 @@ class TwoStage:
         return told
 
 
-class Fixed:
-    """The augmented filter with fixed parameters as a forecast."""
-
-    def __init__(self) -> None:
-        self.belief = None
-
-    def __call__(self, each: Seen) -> Array:
-        belief = self.belief if self.belief is not None else flow_forecast.init_belief(each.start, FIXED)
-        step = (max(each.start, belief.t), each.end, each.current, each.sigma)
-        self.belief, told = flow_forecast.learn_belief(belief, *step, FIXED)
-        return told.mean[0]
-
-
-class OneSea:
-    """The model of the sea of the joint estimator (`sea.gauss_markov`), learnt from the currents alone."""
-
-    def __init__(self) -> None:
-        self.t, self.params = -np.inf, FlowParams()
-        self.x, self.cov = np.zeros(self.params.size), np.diag(gauss_markov.prior(self.params))
-
-    def __call__(self, each: Seen) -> Array:
-        q, gap = gauss_markov.intensities(self.x, 1.0, self.params), max(each.start - self.t, 0.0)
-        gap = gap if np.isfinite(gap) else 0.0
-        step = gauss_markov.passage(gap, each.end - each.start, each.lat, q, self.params)
-        x, cov = step.matrix @ self.x, step.matrix @ self.cov @ step.matrix.T + step.noise
-        mean = self.params.mean
-        gain = cov[:, mean] @ np.linalg.inv(cov[mean, mean] + each.sigma**2 * np.eye(2))
-        self.x, self.cov = x + gain @ (each.current - x[mean]), cov - gain @ cov[mean]
-        self.t = each.end
-        return np.asarray(x[mean])
-
-
 def rows(dives: Sequence[Seen]) -> tuple[list[Row], float]:
     """What was foretold of each dive, and how long it took to learn a dive (s)."""
     others: dict[str, Callable[[Seen], Array | None]] = {
         "two-stage": TwoStage(TwoStageParams(constituents=M2_K1)),
         "two-stage 119 h": TwoStage(TwoStageParams(cutoff=1 / (119.4 * HOUR), constituents=M2_K1)),
-        "fixed": Fixed(),
-        "one sea": OneSea(),
     }
-    state, out, cost = Currents(), [], 0.0
+    state, out, cost, last = Currents(), [], 0.0, None
     for each in dives:
-        told = {name: forecast(each) for name, forecast in others.items()}
-        found, best = forecasts(state, each.start, each.end), predict(state, each.start, each.end)
-        if found is not None and best is not None:
-            told |= {name: mixture.mean for name, mixture in found.items()} | {"chosen": best.flow}
-            out.append(row(each, told, best.source, best.flow, best.cov))
+        told = {name: forecast(each) for name, forecast in others.items()} | {"persistence": last}
         begun = time.process_time()
+        found = predict(state, each.start, each.end)
         state = learn(state, each.start, each.end, each.current, each.sigma)
         cost += time.process_time() - begun
+        if found is not None:
+            out.append(row(each, told | {"foreseen": found.flow}, found.source, found.flow, found.cov))
+        last = each.current
     return out, cost / max(len(dives), 1)
 
 
 def row(each: Seen, told: dict[str, Array | None], source: str, flow: Array, cov: Array) -> Row:
-    lasts = each.end - each.start
+    lasts = each.end.t - each.start.t
     miss = {name: each.current - mean for name, mean in told.items() if mean is not None}
-    e = miss["chosen"]
+    e = miss["foreseen"]
     nis = float(e @ np.linalg.solve(cov + each.sigma**2 * np.eye(2), e))
     # where the truth is not known the reported current stands for it, with its error
     water = each.truth if each.truth is not None else each.current
@@ -204,7 +143,7 @@ def line(name: str, found: Sequence[Row], cost: float) -> str:
     def rms(forecast: str) -> float:
         return 100 * float(np.sqrt(np.mean([r.errors[forecast] ** 2 for r in found])))
 
-    on = np.mean([r.source.startswith("tides") for r in found])
+    on = np.mean(["tides" in r.source for r in found])
     inside = np.mean([r.nis < CHI2_COVERED for r in found])
     spread = np.mean([r.spread < CHI2_COVERED for r in found])
     metres = np.mean([r.metres for r in found], axis=0)
@@ -232,12 +171,11 @@ def main() -> None:
     arguments = parser.parse_args()
     print(machine())
     print(
-        "rms error of the current one dive ahead (cm/s, a component); on how many dives tides are on; how\n"
-        "many are in the 95 % ellipse of the chosen forecast; error of the displacement in 3 h (m) of\n"
-        "persistence and chosen, against the true current where it is known, and how many are in its 95 %\n"
-        "ellipse; time to learn a dive (ms)\n"
-        f"{'':22s} dives   last   2-st  2-119  fixed    one resid.  tides chosen    on  inside   last "
-        "chosen inside    ms"
+        "rms error of the current one dive ahead (cm/s, a component); on how many dives tides are seen; how\n"
+        "many are in the 95 % ellipse of what was foreseen; error of the displacement in 3 h (m) of\n"
+        "persistence and foreseen, against the true current where it is known, and how many are in its 95 %\n"
+        "ellipse; time to foresee and learn a dive (ms)\n"
+        f"{'':22s} dives   last   2-st  2-119 forese.  on  inside   last forese. inside    ms"
     )
     every: list[Row] = []
     if arguments.missions.is_dir():
@@ -248,10 +186,10 @@ def main() -> None:
         print(line("all real missions", every, 0.0))
         print(better(every))
     every, wrong = [], []
-    for name, sea in (SEAS | MORE).items():
+    for name in SEAS:
         some: list[Row] = []
         for seed in range(1, arguments.gliders + 1):
-            dives = simulated(sea, seed, arguments.days)
+            dives = simulated(name, seed, arguments.days)
             wrong += [each.current - each.truth for each in dives if each.truth is not None]
             found, cost = rows(dives)
             some += found

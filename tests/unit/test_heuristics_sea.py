@@ -1,24 +1,14 @@
 """The heuristics of the sea do what their page says: each case lies just on one side of a bound."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from gliderwatch.model import Fix, readonly
-from gliderwatch.sea import flow_forecast, gauss_markov
-from gliderwatch.sea.flow_forecast import (
-    PLAIN_GRID,
-    TIDAL_GRID,
-    Currents,
-    Score,
-    choice,
-    init_bank,
-    learn,
-    learn_bank,
-    notes,
-    predict,
-)
+from gliderwatch.sea import gauss_markov
+from gliderwatch.sea.flow_forecast import Currents, learn, notes, predict, unknown_sea
 from gliderwatch.sea.gauss_markov import FlowParams, crossing, intensities, prior, rates
 from gliderwatch.sea.ocean_field import Field
 from gliderwatch.sea.tides import Constituent, aliasing
@@ -50,61 +40,80 @@ class TestFlow:
         assert gauss_markov.crossing(np.array([1.0, 0.0]), ground, 3e5, FLOW) == 1.0
 
 
-class TestForecast:
-    def test_what_is_tried(self):
-        """Changes in 3 h and memories without tides; with tides amplitudes of M2 too."""
-        steps = PLAIN_GRID.sigma * np.sqrt(2 * -np.expm1(-3 * HOUR / PLAIN_GRID.tau))
-        assert sorted(set(steps.round(6))) == [0.015, 0.04, 0.12]
-        assert sorted(set((PLAIN_GRID.tau / HOUR).round(6))) == [10, 30, 100, 1000]
-        steps = TIDAL_GRID.sigma * np.sqrt(2 * -np.expm1(-3 * HOUR / TIDAL_GRID.tau))
-        assert sorted(set(steps.round(6))) == [0.02, 0.08]
-        assert sorted(set((TIDAL_GRID.tau / HOUR).round(6))) == [30, 300]
-        assert sorted(set(np.sqrt(TIDAL_GRID.prior[:, 0]).round(6))) == [0.05, 0.2]
-        assert np.sqrt(TIDAL_GRID.q * DAY / TIDAL_GRID.prior) == pytest.approx(0.1)
+def fix(t: float) -> Fix:
+    return Fix(t, 41.0, -60.0)
 
-    def learnt(self, bank, current, dives=0):
-        start = bank.t + 600
-        return learn_bank(bank, start, start + 3 * HOUR, np.array(current), 0.006, dives, PLAIN_GRID)[0]
+
+class TestForecast:
+    def test_kinds_of_sea(self):
+        """Restless by 0.3 and 3, inertial motion by 0.1 and 1, tides by 0.03 and 0.3 of what is usual; and
+        three with weather alone, in one of which what passes is gone in 10 h."""
+        each = np.arange(13)
+        sizes = np.sqrt(unknown_sea().cov[:, each, each])
+        sea = np.sqrt([0.3] * 4 + [3] * 4 + [0.3, 3, 1])
+        assert sizes[:, 0] == pytest.approx(0.3)
+        assert sizes[:, 1] == pytest.approx(0.08 * sea * np.sqrt([1] * 10 + [10 / 30]))
+        assert sizes[:, 2] == pytest.approx(0.06 * sea * np.array([0.1, 0.1, 1, 1] * 2 + [0.01] * 3))
+        assert sizes[:, 3] == pytest.approx(0.25 * np.array([0.03, 0.3] * 4 + [0.001] * 3))
+
+    def test_what_lasts_changes_a_hundred_times_less_where_what_passes_is_soon_gone(self):
+        state = self.learnt(Currents(), [0.1, 0.0])
+        spreads = []
+        for kind in (8, 9, 10):
+            fit = np.full(11, -1e3)
+            fit[kind] = 0.0
+            alone = replace(state, sea=replace(state.sea, fit=readonly(fit), scale=np.ones(11)))
+            start = state.end + 2.9 * DAY
+            spreads.append(predict(alone, fix(start), fix(start + 60)).cov[0, 0])
+        lasts, own = math.exp(-2 * 2.9 / 18), np.array([0.3, 3.0, 0.03])
+        passes = 0.08**2 * np.array([0.3, 3.0, 1 / 3])
+        unknown = 1 / (1 / 0.3**2 + 1 / passes)  # what passed on the dive may have lasted
+        assert spreads == pytest.approx(unknown * lasts + 0.3**2 * own * (1 - lasts) + passes, rel=0.06)
+
+    def learnt(self, state, current, dives=None):
+        state = state if dives is None else replace(state, dives=dives)
+        start = (state.end or 0.0) + 600
+        return learn(state, fix(start), fix(start + 3 * HOUR), np.array(current), 0.006)
 
     def test_the_scale_begins_wide_is_learnt_over_40_dives_and_is_bounded(self):
-        bank = init_bank(0.0, PLAIN_GRID)
-        assert set(bank.scale) == {1.5}
-        wild = self.learnt(bank, [50.0, 0.0])
-        assert wild.scale == pytest.approx(1.5 * (1 + 8 / 7))
-        late = self.learnt(bank, [50.0, 0.0], dives=500)
-        assert late.scale == pytest.approx(1.5 * (1 + 8 / 40))
+        assert set(unknown_sea().scale) == {1.5}
+        wild = self.learnt(Currents(), [50.0, 0.0])
+        assert wild.sea.scale == pytest.approx(1.5 * (1 + 8 / 7))
+        late = self.learnt(Currents(), [50.0, 0.0], dives=500)
+        assert late.sea.scale == pytest.approx(1.5 * (1 + 8 / 40))
         for k in range(40):
             wild = self.learnt(wild, [50.0 * (-1) ** k, 0.0])
-        assert set(wild.scale) == {9.0}
+        assert set(wild.sea.scale) == {9.0}
         for k in range(400):
             wild = self.learnt(wild, [0.0, 0.0], k)
-        assert wild.scale.min() == 0.1
+        assert wild.sea.scale.min() == 0.1
 
     def test_a_wild_dive_counts_as_in_student_s_t_of_6(self):
-        bank = self.learnt(init_bank(0.0, PLAIN_GRID), [0.1, 0.0])
-        near, far = self.learnt(bank, [1e3, 0.0]), self.learnt(bank, [1e4, 0.0])
-        assert near.fit - far.fit == pytest.approx((6 + 2) / 2 * math.log(100), rel=1e-3)
+        state = self.learnt(Currents(), [0.1, 0.0])
+        near, far = self.learnt(state, [1e3, 0.0]), self.learnt(state, [1e4, 0.0])
+        assert near.sea.fit - far.sea.fit == pytest.approx((6 + 2) / 2 * math.log(100), rel=1e-3)
 
     def test_a_likelihood_is_forgotten_in_100_dives(self):
-        bank = self.learnt(init_bank(0.0, PLAIN_GRID), [0.1, 0.0])
-        raised = flow_forecast.Bank(bank.t, bank.mean, bank.cov, readonly(bank.fit + 100.0), bank.scale)
-        assert self.learnt(raised, [0.1, 0.0]).fit - self.learnt(bank, [0.1, 0.0]).fit == pytest.approx(99.0)
+        state = self.learnt(Currents(), [0.1, 0.0])
+        raised = replace(state, sea=replace(state.sea, fit=readonly(state.sea.fit + 100.0)))
+        more = self.learnt(raised, [0.1, 0.0]).sea.fit - self.learnt(state, [0.1, 0.0]).sea.fit
+        assert more == pytest.approx(99.0)
+
+    @pytest.mark.parametrize(("errors", "named"), [(1.9, False), (2.1, True)])
+    def test_a_tide_is_named_from_two_standard_errors_on(self, errors, named):
+        state = self.learnt(Currents(), [0.1, 0.0])
+        mean, cov = np.zeros_like(state.sea.mean), np.zeros_like(state.sea.cov)
+        each = np.arange(13)
+        mean[:, 3, 0], cov[:, each, each] = errors * math.sqrt(2 * 2 * 1e-4), 1e-4  # both ways, both parts
+        seen = replace(state, sea=replace(state.sea, mean=mean, cov=cov, scale=np.ones(11)))
+        start = state.end + 600
+        assert ("M2" in predict(seen, fix(start), fix(start + HOUR)).source) == named
 
     @pytest.mark.parametrize(("days", "known"), [(2.9, True), (3.1, False)])
     def test_after_three_days_the_sea_is_unknown(self, days, known):
-        state = learn(Currents(), 0.0, 3 * HOUR, np.array([0.1, 0.0]), 0.006)
+        state = learn(Currents(), fix(0.0), fix(3 * HOUR), np.array([0.1, 0.0]), 0.006)
         start = 3 * HOUR + days * DAY
-        assert (predict(state, start, start + 3 * HOUR) is not None) == known
-
-    @pytest.mark.parametrize(("dives", "chosen"), [(5.9, "persistence"), (6.1, "tides")])
-    def test_six_dives_decide(self, dives, chosen):
-        score = Score(dives, persistence=1.0, residual=0.5, tides=0.1, gain=1.0, gain_squared=0.01)
-        assert choice(Currents(score=score)) == chosen
-
-    @pytest.mark.parametrize(("errors", "chosen"), [(1.9, "residual"), (2.1, "tides")])
-    def test_tides_are_better_by_two_standard_errors(self, errors, chosen):
-        score = Score(9.0, persistence=1.0, residual=0.5, tides=0.1, gain=errors, gain_squared=1.0)
-        assert choice(Currents(score=score)) == chosen
+        assert (predict(state, fix(start), fix(start + 3 * HOUR)) is not None) == known
 
     @pytest.mark.parametrize(
         ("apart", "n", "noted"), [(1.09, 8, True), (1.11, 8, False), (1.0, 7, False), (1.0, 9, True)]
@@ -113,7 +122,7 @@ class TestForecast:
         state = Currents()
         for k in range(n + 1):
             end = (k + 1) * 6.21 * HOUR + (apart - 1) * 6.21 * HOUR * (k >= 5)
-            state = learn(state, end - 2 * HOUR, end, np.array([0.1, 0.0]), 0.006)
+            state = learn(state, fix(end - 2 * HOUR), fix(end), np.array([0.1, 0.0]), 0.006)
         assert bool(notes(state)) == noted
 
 

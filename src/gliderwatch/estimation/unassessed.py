@@ -76,7 +76,7 @@ Mean = tuple[Array, Array]
 
 def of_tides(currents: Currents, start: Fix, end: Fix) -> Reference:
     """The forecast from the currents of the dives before, of a dive between two fixes."""
-    found = predict(currents, start.t, end.t)
+    found = predict(currents, start, end)
     if found is None:
         return _none("no forecast of the current yet")
     return Reference(_current(found.flow), found.cov, (f"{OTHER_REFERENCE} {found.source}", *found.notes))

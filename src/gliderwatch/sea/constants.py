@@ -37,9 +37,21 @@ CURRENT_SCALE = 60e3
 """m over which currents differ by their own size."""
 
 # The forecast of the reference flow
+SEA_KINDS = (
+    *(
+        (restless, restless, PASSING_MEMORY, inertial, tides)
+        for restless in (0.3, 3.0)
+        for inertial in (0.1, 1.0)
+        for tides in (0.03, 0.3)
+    ),
+    *((restless, restless, PASSING_MEMORY, 0.01, 0.001) for restless in (0.3, 3.0)),
+    (0.03, 1.0, 36e3, 0.01, 0.001),
+)
+"""The kinds of sea that are tried: factors on the noise of what lasts and of what passes, the memory of what
+passes (s), factors on the sizes of inertial motion and of the tides. The last three have weather alone
+(`benchmarks/currents.py`)."""
 FIT_MEMORY = 100
-"""Dives after which what a filter of the bank foretold counts for a third, and what a forecast scored:
-seas change along the way."""
+"""Dives after which what a kind of sea foretold counts for a third: seas change along the way."""
 TAIL = 6.0
 """Degrees of freedom of Student's t by which innovations are judged: one wild dive must not decide."""
 SCALE_MEMORY = 40
@@ -52,24 +64,10 @@ SCALES = (0.1, 9.0)
 """Bounds of the scale,"""
 FIRST_SCALE = 1.5
 """and its first guess: little is known at first, and forecasts should say so."""
-PLAIN_STEPS = (0.015, 0.04, 0.12)
-"""m/s: usual changes of the residual in 3 h that are tried without tides,"""
-PLAIN_MEMORIES = (36e3, 108e3, 360e3, 3600e3)
-"""s: and its memories: 10, 30, 100 and 1000 h."""
-TIDAL_STEPS = (0.02, 0.08)
-"""m/s: usual changes of the residual that are tried with tides,"""
-TIDAL_MEMORIES = (108e3, 1080e3)
-"""s: and its memories: 30 and 300 h."""
-TIDAL_AMPLITUDES = (0.05, 0.2)
-"""m/s: usual amplitudes of M2 and K1 that are tried,"""
-TIDAL_CHANGE = 0.1
-"""and the part of them that changes in a day."""
+TIDE_SEEN = 4.0
+"""Squared size of a tide in variances from which on it is named: twice its standard error."""
 APART = 3 * 86400.0
 """s without a current after which the sea is taken for unknown."""
-ENOUGH = 6.0
-"""Dives that a score needs before it decides."""
-MARGIN = 2.0
-"""Standard errors by which tides have to be better than persistence."""
 INTERVALS_KEPT = 8
 """Dives whose intervals say how often the glider surfaces."""
 EVEN = 0.1

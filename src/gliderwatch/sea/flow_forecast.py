@@ -1,340 +1,71 @@
-"""The flow that a glider will meet next, learnt from the currents of its own dives. Pure."""
+"""The flow that a glider will meet next, by the one model of the sea, from the currents of its dives. Pure.
+
+How restless this sea is, and whether it has tides and inertial motion at all, is learnt from the mission: the
+model (`gauss_markov`) runs in several kinds of sea side by side, which count by how well each has foretold
+the dives so far. That is maximum likelihood on a grid, refitted with every dive at the cost of one step: no
+search that could end elsewhere on another run, and what is uncertain about the sea is part of the forecast's
+covariance. A scale of all variances is learnt for each kind from its own innovations. The state is a value,
+and a function of the dives so far.
+
+The parts of the flow know nothing of each other, and turn alike whatever way they point: so does the error
+of a current. The filter of a kind is one of complex numbers, with the covariance of a component.
+"""
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache
 
 import numpy as np
 
-from gliderwatch.model import Array, readonly
+from gliderwatch.model import Array, Fix, readonly
+from gliderwatch.navigation.geodesy import displacement
 from gliderwatch.sea.constants import (
     APART,
-    ENOUGH,
     EVEN,
     FAR,
     FIRST_SCALE,
     FIT_MEMORY,
     INTERVALS_KEPT,
-    MARGIN,
-    PLAIN_MEMORIES,
-    PLAIN_STEPS,
     SCALE_FEW,
     SCALE_MEMORY,
     SCALES,
+    SEA_KINDS,
     TAIL,
-    TIDAL_AMPLITUDES,
-    TIDAL_CHANGE,
-    TIDAL_MEMORIES,
-    TIDAL_STEPS,
+    TIDE_SEEN,
 )
-from gliderwatch.sea.tides import HOUR, Constituent, aliasing
+from gliderwatch.sea.gauss_markov import (
+    FIXED,
+    Complex,
+    FlowParams,
+    crossing,
+    prior,
+    rates,
+    restless,
+    rotary_passage,
+    wandering,
+)
+from gliderwatch.sea.tides import Constituent, aliasing
 
-# ----------------------------------------
-# The current at a glider as one linear stochastic model, seen through means over dives. Pure.
-#
-# In each component the current is u = r + Re(sum c_k). The residual r is an Ornstein-Uhlenbeck process, dr
-# = -r/tau dt + sigma sqrt(2/tau) dW; each tide a noisy oscillator, dc = i omega c dt + sqrt(q) dW with W
-# complex and of unit strength in both parts, so that its amplitude wanders. I, the integral of u since the
-# dive began, is part of the state while the glider dives: the depth-averaged current of a dive that lasts T
-# is I/T, exact for any T and any gap between dives, and a forecast of I is the displacement by the current.
-#
-# Numbers of a component: r, then Re c and Im c of each tide, then I. Both components have the same
-# covariance. Everything is done for G sets of parameters at once.
+TIDES = (Constituent.M2, Constituent.S2, Constituent.N2, Constituent.K1, Constituent.O1)
+"""Those of `FlowParams`, in its order."""
+PARAMS = FlowParams()
 
 
-@dataclass(frozen=True, slots=True)
-class Parameters:
-    """G sets of parameters for the same C tides.
+@dataclass(frozen=True, slots=True, eq=False)
+class Sea:
+    """What each of G kinds of sea knows after a dive; m are the parts of the flow.
 
-    ``sigma`` (m/s, (G,)) usual size of the residual in a component and ``tau`` (s, (G,)) its memory; ``q``
-    (m2/s3, (G, C)) variance that a second adds to each part of a tide; ``prior`` (m2/s2, (G, C)) variance
-    of these parts before any dive; ``omega`` (rad/s, (C,)).
+    ``mean`` (m/s, (G, m, 2): east, north); ``cov`` (m2/s2, (G, m, m)) of a component, Hermitian: the real
+    part on and above the diagonal, the imaginary part below; ``fit`` (G,) logarithm of the likelihood, what
+    is long ago counting less; ``scale`` (G,) factor on the variances.
     """
 
-    sigma: Array
-    tau: Array
-    q: Array
-    prior: Array
-    omega: Array
-
-    @property
-    def size(self) -> int:
-        """Numbers a component between dives, n = 1 + 2 C."""
-        return 1 + 2 * len(self.omega)
-
-
-@dataclass(frozen=True, slots=True)
-class Belief:
-    """What is known of the current at a time ``t`` (s): ``mean`` (m/s, (G, n, 2): east, north) and ``cov``
-    (m2/s2, (G, n, n)) of a component."""
-
-    t: float
-    mean: Array
-    cov: Array
-
-
-@dataclass(frozen=True, slots=True)
-class Forecast:
-    """Mean flow over an interval: ``mean`` (m/s, (G, 2)), and ``var`` of a component (m2/s2, (G,))."""
-
-    mean: Array
-    var: Array
-
-
-def init_belief(t: float, params: Parameters) -> Belief:
-    """What is known before any dive."""
-    sets, n = len(params.sigma), params.size
-    cov = np.zeros((sets, n, n))
-    cov[:, 0, 0] = params.sigma**2
-    k = np.arange(1, n)
-    cov[:, k, k] = np.repeat(params.prior, 2, axis=1)
-    return Belief(t, readonly(np.zeros((sets, n, 2))), readonly(cov))
-
-
-def transition(dt: float, params: Parameters) -> tuple[Array, Array]:
-    """What ``dt`` seconds make of the state, and covariance of what chance adds: (G, n+1, n+1) each.
-
-    The stochastic integrals are exact, so that two steps do what one of their length does.
-    """
-    n = params.size
-    f, q = (np.zeros((len(params.sigma), n + 1, n + 1)) for _ in range(2))
-    kept, variance, tau = np.exp(-dt / params.tau), params.sigma**2, params.tau
-    f[:, 0, 0], f[:, n, 0], f[:, n, n] = kept, tau * (1 - kept), 1.0
-    q[:, 0, 0] = variance * -np.expm1(-2 * dt / tau)
-    q[:, 0, n] = q[:, n, 0] = variance * tau * np.expm1(-dt / tau) ** 2
-    q[:, n, n] = variance * _wandered(dt, tau)
-    for k, omega in enumerate(params.omega.tolist()):
-        a, b = 1 + 2 * k, 2 + 2 * k
-        angle, each = omega * dt, params.q[:, k]
-        cos, sin = np.cos(angle), np.sin(angle)
-        f[:, a, a] = f[:, b, b] = cos
-        f[:, b, a], f[:, a, b] = sin, -sin
-        f[:, n, a], f[:, n, b] = sin / omega, (cos - 1) / omega
-        q[:, a, a] = q[:, b, b] = each * dt
-        q[:, a, n] = q[:, n, a] = each * (1 - cos) / omega**2
-        q[:, b, n] = q[:, n, b] = each * (angle - sin) / omega**2
-        q[:, n, n] += each * 2 * (angle - sin) / omega**3
-    return f, q
-
-
-def _wandered(dt: float, tau: Array) -> Array:
-    """Variance (s2) of the integral of what an Ornstein-Uhlenbeck process of variance 1 gains in ``dt`` s."""
-    x = dt / tau
-    kept = np.exp(-x)
-    exact = 2 * x - 3 + 4 * kept - kept**2
-    # the terms cancel where x is small
-    return np.asarray(tau**2 * np.where(x < 1e-3, 2 / 3 * x**3 * (1 - 0.75 * x), exact))
-
-
-def _moved(belief: Belief, dt: float, params: Parameters) -> tuple[Array, Array]:
-    """Mean (G, n+1, 2) and covariance (G, n+1, n+1) after ``dt`` s, I counted from now."""
-    f, q = transition(dt, params)
-    from_now = f[:, :, :-1]
-    return from_now @ belief.mean, from_now @ belief.cov @ from_now.transpose(0, 2, 1) + q
-
-
-def at(belief: Belief, t: float, params: Parameters) -> Belief:
-    """What is known of the current at a later time ``t`` (s), without a dive until then."""
-    if t <= belief.t:
-        return belief
-    mean, cov = _moved(belief, t - belief.t, params)
-    return Belief(t, readonly(mean[:, :-1]), readonly(cov[:, :-1, :-1]))
-
-
-def forecast_belief(belief: Belief, start: float, end: float, params: Parameters) -> Forecast:
-    """The mean flow between two times (s) that are not before the belief's."""
-    mean, cov = _moved(at(belief, start, params), end - start, params)
-    lasts = end - start
-    return Forecast(readonly(mean[:, -1] / lasts), readonly(cov[:, -1, -1] / lasts**2))
-
-
-def learn_belief(
-    belief: Belief, start: float, end: float, current: Array, sigma: float, params: Parameters
-) -> tuple[Belief, Forecast]:
-    """What is known at the end of a dive by its ``current`` (m/s, (2,)), and what was expected of that.
-
-    ``sigma`` (m/s) is the current's standard error in a component, ``start`` and ``end`` (s) the dive's.
-    """
-    lasts = end - start
-    mean, cov = _moved(at(belief, start, params), lasts, params)
-    expected = Forecast(readonly(mean[:, -1] / lasts), readonly(cov[:, -1, -1] / lasts**2))
-    row = cov[:, :-1, -1] / lasts
-    gain = row / (expected.var + sigma**2)[:, None]
-    after = mean[:, :-1] + gain[:, :, None] * (current - expected.mean)[:, None, :]
-    left = cov[:, :-1, :-1] - gain[:, :, None] * row[:, None, :]
-    return Belief(end, readonly(after), readonly((left + left.transpose(0, 2, 1)) / 2)), expected
-
-
-# ----------------------------------------
-# Filters with different parameters side by side, weighted by how well each has foretold the mission. Pure.
-#
-# That is maximum likelihood on a grid, refitted with every dive at the cost of one step: no search that could
-# end elsewhere on another run, and what is uncertain in the parameters is part of the forecast's covariance.
-# The grid holds ratios; the scale of all variances is learnt for each set from its own innovations.
-
-STRENGTH = {
-    Constituent.M2: 1.0,
-    Constituent.S2: 0.46,
-    Constituent.N2: 0.2,
-    Constituent.K1: 1.0,
-    Constituent.O1: 0.7,
-    Constituent.M4: 0.2,
-}
-"""Usual amplitude of a tide as part of that of the first of its kind (equilibrium tide: S2 0.46, N2 0.19 of
-M2, O1 0.71 of K1)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Bank:
-    """What the filters know after a dive that ended at ``t`` (s).
-
-    ``mean`` (m/s, (G, n, 2)); ``cov`` (m2/s2, (G, n (n + 1) / 2)) upper triangles, row by row; ``fit`` (G,)
-    logarithm of the likelihood, what is long ago counting less; ``scale`` (G,) factor on the variances.
-    """
-
-    t: float
     mean: Array
     cov: Array
     fit: Array
     scale: Array
-
-
-@dataclass(frozen=True, slots=True)
-class Mixture:
-    """A mean flow (m/s, (2,)) with its covariance (m2/s2, (2, 2))."""
-
-    mean: Array
-    cov: Array
-
-
-def grid(
-    steps: Sequence[float],
-    memories: Sequence[float],
-    tides: Sequence[tuple[float, float]],
-    constituents: Sequence[Constituent],
-) -> Parameters:
-    """All combinations.
-
-    ``steps`` (m/s) usual change of the residual in 3 h; ``memories`` (s); ``tides`` usual amplitude of M2 and
-    K1 (m/s) with the part of it that changes in a day.
-    """
-    strength = np.array([STRENGTH[each] for each in constituents])
-    rows = []
-    for step, memory, (amplitude, wander) in itertools.product(steps, memories, tides):
-        sigma = step / np.sqrt(-2 * np.expm1(-3 * HOUR / memory))
-        rows.append((sigma, memory, (wander * amplitude) ** 2 / (24 * HOUR), amplitude**2))
-    sigma, tau, q, prior = np.array(rows).T
-    return Parameters(
-        readonly(sigma),
-        readonly(tau),
-        readonly(np.outer(q, strength**2)),
-        readonly(np.outer(prior, strength**2)),
-        readonly([each.omega for each in constituents]),
-    )
-
-
-def init_bank(t: float, params: Parameters) -> Bank:
-    """Before any dive, at a time (s)."""
-    belief, sets = init_belief(t, params), len(params.sigma)
-    return Bank(
-        t, belief.mean, _packed(belief.cov), readonly(np.zeros(sets)), readonly(np.full(sets, FIRST_SCALE))
-    )
-
-
-def belief(bank: Bank) -> Belief:
-    """What each filter knows, its covariances not scaled."""
-    n = bank.mean.shape[1]
-    cov = np.empty((len(bank.mean), n, n))
-    rows, columns = np.triu_indices(n)
-    cov[:, rows, columns] = cov[:, columns, rows] = bank.cov
-    return Belief(bank.t, bank.mean, cov)
-
-
-def forecast_bank(bank: Bank, start: float, end: float, params: Parameters) -> Mixture:
-    """The mean flow between two times (s) not before the last dive's end."""
-    each = forecast_belief(belief(bank), start, end, params)
-    return _mixed(bank, each.mean, each.var * bank.scale)
-
-
-def learn_bank(
-    bank: Bank, start: float, end: float, current: Array, sigma: float, dives: int, params: Parameters
-) -> tuple[Bank, Mixture]:
-    """The bank after a dive, and the mean flow that it had expected.
-
-    ``current`` (m/s, (2,)) with error ``sigma`` (m/s) in a component, ``dives`` seen before.
-    """
-    after, each = learn_belief(belief(bank), start, end, current, sigma, params)
-    variance = (each.var + sigma**2) * bank.scale
-    square = np.sum((current - each.mean) ** 2, axis=1) / variance
-    likelihood = -np.log(variance) - (TAIL + 2) / 2 * np.log1p(square / TAIL)
-    surprise = np.minimum(square / 2, FAR) - 1
-    scale = np.clip(bank.scale * (1 + surprise / min(dives + 1 + SCALE_FEW, SCALE_MEMORY)), *SCALES)
-    fit = bank.fit * (1 - 1 / FIT_MEMORY) + likelihood
-    learnt = Bank(end, after.mean, _packed(after.cov), readonly(fit), readonly(scale))
-    return learnt, _mixed(bank, each.mean, each.var * bank.scale)
-
-
-def weights(bank: Bank) -> Array:
-    """What each filter counts for (G,); they add up to 1."""
-    relative = np.exp(bank.fit - bank.fit.max())
-    return np.asarray(relative / relative.sum())
-
-
-def _mixed(bank: Bank, mean: Array, var: Array) -> Mixture:
-    """Mean and covariance of the mixture of forecasts with ``mean`` ((G, 2)) and ``var`` ((G,))."""
-    weight = weights(bank)
-    middle = weight @ mean
-    apart = mean - middle
-    cov = (weight @ var) * np.eye(2) + (weight[:, None] * apart).T @ apart
-    return Mixture(readonly(middle), readonly(cov))
-
-
-def _packed(cov: Array) -> Array:
-    rows, columns = np.triu_indices(cov.shape[1])
-    return readonly(cov[:, rows, columns])
-
-
-# ----------------------------------------
-# The flow that a glider will meet next, from the currents of its own dives. Pure.
-#
-# Three forecasts run side by side and are scored one dive ahead on the mission's own past: persistence (the
-# last depth-averaged current), the residual alone, and the residual with tides. Tides are believed only where
-# they have clearly beaten persistence. The state is a value, and a function of the dives so far.
-
-TIDES = (Constituent.M2, Constituent.S2, Constituent.K1, Constituent.O1)
-PLAIN_GRID = grid(PLAIN_STEPS, PLAIN_MEMORIES, ((0.0, 0.0),), ())
-TIDAL_GRID = grid(TIDAL_STEPS, TIDAL_MEMORIES, [(size, TIDAL_CHANGE) for size in TIDAL_AMPLITUDES], TIDES)
-
-
-@dataclass(frozen=True, slots=True)
-class Score:
-    """One step ahead, what is long ago counting less: ``dives``, and sums of squared errors (m2/s2) of each
-    forecast; ``gain`` by how much tides were better than persistence, ``gain_squared`` of its squares."""
-
-    dives: float = 0.0
-    persistence: float = 0.0
-    residual: float = 0.0
-    tides: float = 0.0
-    gain: float = 0.0
-    gain_squared: float = 0.0
-
-    @property
-    def tides_won(self) -> bool:
-        """Whether tides have clearly beaten persistence, and the residual alone as well."""
-        enough = self.dives >= ENOUGH and self.tides < self.residual
-        return enough and self.gain > MARGIN * math.sqrt(self.gain_squared)
-
-
-@dataclass(frozen=True, slots=True)
-class Filters:
-    """The two banks of filters, without and with tides, and the last ``current`` (m/s, (2,))."""
-
-    plain: Bank
-    tidal: Bank
-    current: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -347,8 +78,7 @@ class Currents:
 
     end: float | None = None
     dives: int = 0
-    filters: Filters | None = None
-    score: Score = field(default_factory=Score)
+    sea: Sea | None = None
     intervals: tuple[float, ...] = ()
     durations: tuple[float, ...] = ()
 
@@ -364,75 +94,72 @@ class Prediction:
     notes: tuple[str, ...]
 
 
-def learn(state: Currents, start: float, end: float, current: Array, sigma: float) -> Currents:
-    """The state after a dive from ``start`` to ``end`` (s) whose ``current`` (m/s, (2,)) is believed.
+@dataclass(frozen=True, slots=True)
+class _Foreseen:
+    """The parts at the end of a dive and the mean flow over it before its current is known: ``mean`` ((G,
+    m + 1)) and ``cov`` ((G, m + 1, m + 1)), not scaled."""
+
+    mean: Complex
+    cov: Complex
+
+
+def learn(state: Currents, start: Fix, end: Fix, current: Array, sigma: float) -> Currents:
+    """The state after a dive between two fixes whose ``current`` (m/s, (2,)) is believed.
 
     ``sigma`` (m/s) is the current's standard error in a component. A dive that does not end after the last
     one teaches nothing. Raises ValueError where a number is not finite, or ``sigma`` not positive.
     """
-    if not (
-        math.isfinite(start) and math.isfinite(end) and np.isfinite(current).all() and 0 < sigma < math.inf
-    ):
+    if not (np.isfinite([start.t, end.t, *current]).all() and 0 < sigma < math.inf):
         raise ValueError(f"no current to learn from: {current} with error {sigma} from {start} to {end}")
-    if state.end is not None and start - state.end > APART:
+    if state.end is not None and start.t - state.end > APART:
         state = Currents()
-    begin = start if state.end is None else max(start, state.end)
-    if end <= begin:
+    begin = start.t if state.end is None else max(start.t, state.end)
+    if end.t <= begin:
         return state
-    held = state.filters
-    if held is None:
-        held = Filters(init_bank(begin, PLAIN_GRID), init_bank(begin, TIDAL_GRID), readonly(current))
-    dives = state.dives
-    plain, residual = learn_bank(held.plain, begin, end, current, sigma, dives, PLAIN_GRID)
-    tidal, tides = learn_bank(held.tidal, begin, end, current, sigma, dives, TIDAL_GRID)
-    if dives:
-        squares = [float(np.sum((current - x) ** 2)) for x in (held.current, residual.mean, tides.mean)]
-        state = replace(state, score=_scored(state.score, *squares))
-    between = () if state.end is None else (end - state.end,)
-    return replace(
-        state,
-        end=end,
-        dives=dives + 1,
-        filters=Filters(plain, tidal, readonly(current)),
+    sea = unknown_sea() if state.sea is None else state.sea
+    foreseen = _foreseen(sea, begin - (state.end or begin), end.t - begin, start, end)
+    between = () if state.end is None else (end.t - state.end,)
+    return Currents(
+        end=end.t,
+        dives=state.dives + 1,
+        sea=_learnt(sea, foreseen, complex(*current), sigma, state.dives),
         intervals=(*state.intervals, *between)[-INTERVALS_KEPT:],
-        durations=(*state.durations, end - begin)[-INTERVALS_KEPT:],
+        durations=(*state.durations, end.t - begin)[-INTERVALS_KEPT:],
     )
 
 
-def predict(state: Currents, start: float, end: float) -> Prediction | None:
-    """The mean flow between two times (s); None before the first dive, long after the last, or within it."""
-    chosen = choice(state)
-    found = forecasts(state, start, end)
-    if found is None:
+def predict(state: Currents, start: Fix, end: Fix) -> Prediction | None:
+    """The mean flow on a dive between two fixes; None before the first dive, long after the last, or within
+    it."""
+    if state.sea is None or state.end is None or start.t - state.end > APART:
         return None
-    source = _tides_words(state) if chosen == "tides" else chosen
-    return Prediction(found[chosen].mean, found[chosen].cov, source, notes(state))
-
-
-def choice(state: Currents) -> str:
-    """Which of the `forecasts` the mission's past speaks for."""
-    score = state.score
-    if score.tides_won:
-        return "tides"
-    return "residual" if score.dives >= ENOUGH and score.residual <= score.persistence else "persistence"
-
-
-def forecasts(state: Currents, start: float, end: float) -> dict[str, Mixture] | None:
-    """All three forecasts of the mean flow between two times (s), by name.
-
-    The error of persistence is that of the residual's forecast, and how far the two are apart.
-    """
-    held = state.filters
-    if held is None or state.end is None or start - state.end > APART:
+    begin = max(start.t, state.end)
+    if end.t <= begin:
         return None
-    begin = max(start, state.end)
-    if end <= begin:
-        return None
-    residual = forecast_bank(held.plain, begin, end, PLAIN_GRID)
-    tides = forecast_bank(held.tidal, begin, end, TIDAL_GRID)
-    apart = held.current - residual.mean
-    last = Mixture(held.current, readonly(residual.cov + np.outer(apart, apart)))
-    return {"persistence": last, "residual": residual, "tides": tides}
+    foreseen = _foreseen(state.sea, begin - state.end, end.t - begin, start, end)
+    weight, means = weights(state.sea), foreseen.mean[:, -1]
+    middle = complex(weight @ means)
+    apart = means - middle
+    off = np.column_stack([apart.real, apart.imag])
+    within = float(weight @ (foreseen.cov[:, -1, -1].real * state.sea.scale))
+    cov = within * np.eye(2) + (weight[:, None] * off).T @ off
+    flow = readonly([middle.real, middle.imag])
+    return Prediction(flow, readonly(cov), _source(state.sea), notes(state))
+
+
+def unknown_sea() -> Sea:
+    """Before any dive."""
+    kinds, each = len(SEA_KINDS), np.arange(PARAMS.parts)
+    cov = np.zeros((kinds, PARAMS.parts, PARAMS.parts))
+    cov[:, each, each] = _prior()
+    mean = readonly(np.zeros((kinds, PARAMS.parts, 2)))
+    return Sea(mean, readonly(cov), readonly(np.zeros(kinds)), readonly(np.full(kinds, FIRST_SCALE)))
+
+
+def weights(sea: Sea) -> Array:
+    """What each kind of sea counts for (G,); they add up to 1."""
+    relative = np.exp(sea.fit - sea.fit.max())
+    return np.asarray(relative / relative.sum())
 
 
 def notes(state: Currents) -> tuple[str, ...]:
@@ -445,29 +172,99 @@ def notes(state: Currents) -> tuple[str, ...]:
     return aliasing(TIDES, usual, float(np.median(state.durations)))
 
 
-def _scored(score: Score, persistence: float, residual: float, tides: float) -> Score:
-    """The score after one more dive's squared errors (m2/s2)."""
-    kept, gain = 1 - 1 / FIT_MEMORY, persistence - tides
-    return Score(
-        dives=kept * score.dives + 1,
-        persistence=kept * score.persistence + persistence,
-        residual=kept * score.residual + residual,
-        tides=kept * score.tides + tides,
-        gain=kept * score.gain + gain,
-        gain_squared=kept * score.gain_squared + gain**2,
+# ----------------------------------------
+# The kinds of sea, and what a dive makes of what each knows.
+
+
+@cache
+def _prior() -> Array:
+    """Variance (m2/s2, (G, m)) of each part before any dive."""
+    _, passing, memory, inertial, tides = np.array(SEA_KINDS).T
+    out = np.tile(prior(PARAMS)[:-2:2], (len(SEA_KINDS), 1))
+    out[:, 1] *= passing * memory / PARAMS.memory  # as much as its noise keeps up
+    out[:, 2] *= passing * inertial**2
+    out[:, FIXED:] *= tides[:, None] ** 2
+    return readonly(out)
+
+
+@cache
+def _restless() -> Array:
+    """q (m2/s3, (G, FIXED)) of the parts that are no tides."""
+    lasting, passing, _, inertial, _ = np.array(SEA_KINDS).T
+    return readonly(restless(PARAMS) * np.stack([lasting, passing, passing * inertial**2], axis=1))
+
+
+@lru_cache(maxsize=64)
+def _rates(lat: float) -> Complex:
+    """i omega - 1 / tau of each part (1/s, (G, m)) at a latitude (degrees)."""
+    return np.array([rates(lat, replace(PARAMS, memory=kind[2])) for kind in SEA_KINDS])
+
+
+def _intensities(mean: Complex) -> Array:
+    """q (m2/s3, (G, m)) of each part where the parts are ``mean`` ((G, m))."""
+    tides = mean[:, FIXED:]
+    return np.hstack([_restless(), wandering(tides.real**2 + tides.imag**2, PARAMS)])
+
+
+@cache
+def _lasting() -> Array:
+    """The factor on the noise of what lasts (G,)."""
+    return readonly([kind[0] for kind in SEA_KINDS])
+
+
+@lru_cache(maxsize=64)  # a dive is foreseen, and then learnt
+def _foreseen(sea: Sea, gap: float, lasts: float, start: Fix, end: Fix) -> _Foreseen:
+    """What each kind of sea expects of a dive that lasts so long (s), a `gap` (s) after the last."""
+    mean, cov = sea.mean[..., 0] + 1j * sea.mean[..., 1], _unpacked(sea.cov)
+    parts, _ = rotary_passage(gap, lasts, _rates(start.lat), _intensities(mean))
+    matrix, noise = parts[:, 0, :, :-1], parts[:, 1]
+    cov = matrix @ cov @ matrix.conj().transpose(0, 2, 1) + noise
+    ground = displacement(end.lat, end.lon, start.lat, start.lon) / max(end.t - start.t, 1.0)
+    steps = np.zeros(PARAMS.parts + 1)
+    steps[[0, -1]] = 1.0
+    flows = mean[:, 0] + mean[:, 1]
+    crossed = [crossing(np.array([z.real, z.imag]), ground, gap + lasts, PARAMS) for z in flows]
+    new = _lasting() * np.square(crossed)
+    cov = cov + new[:, None, None] * np.outer(steps, steps)
+    return _Foreseen((matrix @ mean[:, :, None])[..., 0], cov)
+
+
+def _learnt(sea: Sea, foreseen: _Foreseen, current: complex, sigma: float, dives: int) -> Sea:
+    """What is known when the ``current`` (m/s, east + i north) is, after so many ``dives`` before."""
+    off = current - foreseen.mean[:, -1]
+    own = foreseen.cov[:, -1, -1].real + sigma**2
+    row = foreseen.cov[:, :-1, -1]
+    mean = foreseen.mean[:, :-1] + row * (off / own)[:, None]
+    cov = foreseen.cov[:, :-1, :-1] - row[:, :, None] * row.conj()[:, None, :] / own[:, None, None]
+    variance = own * sea.scale
+    square = np.abs(off) ** 2 / variance
+    likelihood = -np.log(variance) - (TAIL + 2) / 2 * np.log1p(square / TAIL)
+    surprise = np.minimum(square / 2, FAR) - 1
+    scale = np.clip(sea.scale * (1 + surprise / min(dives + 1 + SCALE_FEW, SCALE_MEMORY)), *SCALES)
+    return Sea(
+        readonly(np.stack([mean.real, mean.imag], axis=-1)),
+        readonly(_packed(cov)),
+        readonly(sea.fit * (1 - 1 / FIT_MEMORY) + likelihood),
+        readonly(scale),
     )
 
 
-def _tides_words(state: Currents) -> str:
-    """The tides that are seen: those whose amplitude is more than twice its standard error."""
-    assert state.filters is not None
-    tidal = state.filters.tidal
-    best = int(np.argmax(tidal.fit))
-    mean, cov = tidal.mean[best], belief(tidal).cov[best] * tidal.scale[best]
-    seen = [
-        str(each)
-        for k, each in enumerate(TIDES)
-        if np.sum(mean[1 + 2 * k : 3 + 2 * k] ** 2)
-        > 4 * 2 * (cov[1 + 2 * k, 1 + 2 * k] + cov[2 + 2 * k, 2 + 2 * k])
-    ]
-    return f"tides {' '.join(seen or map(str, TIDES))} + residual"
+def _packed(cov: Complex) -> Array:
+    """Hermitian matrices as real ones, see `Sea`."""
+    return np.triu(cov.real) + np.tril(cov.imag, -1)
+
+
+def _unpacked(cov: Array) -> Complex:
+    real, imag = np.triu(cov), np.tril(cov, -1)
+    upper = real + np.triu(real, 1).transpose(0, 2, 1)
+    return np.asarray(upper + 1j * (imag - imag.transpose(0, 2, 1)))
+
+
+def _source(sea: Sea) -> str:
+    """What a forecast rests on, with the tides that are seen."""
+    best = int(np.argmax(sea.fit))
+    size = np.square(sea.mean[best]).sum(-1)[FIXED:]
+    variance = 2 * sea.scale[best] * np.diagonal(sea.cov[best])[FIXED:]
+    both = (size[::2] + size[1::2]) > TIDE_SEEN * (variance[::2] + variance[1::2])  # either way round
+    seen = [str(each) for each, is_seen in zip(TIDES, both, strict=True) if is_seen]
+    return "forecast by the dives before" + (f", with tides {' '.join(seen)}" if seen else "")

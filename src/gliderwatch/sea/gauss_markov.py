@@ -150,14 +150,17 @@ def intensities(state: Array, sea: float, params: FlowParams) -> Array:
     ``sea`` is a factor on those of the parts that are no tides.
     """
     squares = np.square(state[2 * FIXED : -2])
-    tidal = (squares[::2] + squares[1::2]) / 2
-    least = params.tide_least**2
-    return np.concatenate([sea * _fixed(params), params.tide_wander**2 / DAY * (tidal + least)])
+    return np.concatenate([sea * restless(params), wandering(squares[::2] + squares[1::2], params)])
+
+
+def wandering(square: Array, params: FlowParams) -> Array:
+    """q (m2/s3) of tidal parts of which the squared size (m2/s2) is ``square``."""
+    return np.asarray(params.tide_wander**2 / DAY * (square / 2 + params.tide_least**2))
 
 
 @cache
-def _fixed(params: FlowParams) -> Array:
-    """q (m2/s3) of the parts that are no tides."""
+def restless(params: FlowParams) -> Array:
+    """q (m2/s3, (FIXED,)) of the parts that are no tides."""
     return readonly(
         [
             2 * params.lasting**2 / params.lasting_memory,
@@ -172,23 +175,32 @@ def passage(gap: float, dive: float, lat: float, q: Array, params: FlowParams) -
 
     The stochastic integrals are exact: two gaps do what one of their length does.
     """
-    a = rates(lat, params)
+    parts, new = rotary_passage(gap, dive, rates(lat, params), q)
+    matrix, noise = _real(parts)
+    return Passage(matrix, noise, float(new[:FIXED].sum()))
+
+
+def rotary_passage(gap: float, dive: float, a: Complex, q: Array) -> tuple[Complex, Array]:
+    """The same of the parts and the mean flow as complex numbers.
+
+    ``a`` are the `rates` and ``q`` the intensities, both (..., parts). Matrix and noise ((..., 2, parts + 1,
+    parts + 1)), and the variance of a component of the mean flow that each part adds ((..., parts)).
+    """
     kept = np.exp(a * gap)
     gained = q * _squared(a, gap)
     phi, square, integral = np.exp(a * dive), _squared(a, dive), _integral(a, dive)
     mean, cross, own = integral / dive, *_wandered(a, dive, square, integral)
-    m = params.parts
+    m = a.shape[-1]
     each = np.arange(m)
-    parts = np.zeros((2, m + 1, m + 1), dtype=np.complex128)  # of the matrix, and of the noise
-    parts[0, each, each] = phi * kept
-    parts[0, m, :m] = mean * kept
-    parts[1, each, each] = q * square + gained * np.abs(phi) ** 2
-    parts[1, m, :m] = q * cross / dive + gained * mean * np.conj(phi)
-    parts[1, :m, m] = np.conj(parts[1, m, :m])
+    parts = np.zeros((*q.shape[:-1], 2, m + 1, m + 1), dtype=np.complex128)  # of the matrix, and of the noise
+    parts[..., 0, each, each] = phi * kept
+    parts[..., 0, m, :m] = mean * kept
+    parts[..., 1, each, each] = q * square + gained * np.abs(phi) ** 2
+    parts[..., 1, m, :m] = q * cross / dive + gained * mean * np.conj(phi)
+    parts[..., 1, :m, m] = np.conj(parts[..., 1, m, :m])
     new = q * own / dive**2 + gained * np.abs(mean) ** 2
-    parts[1, m, m] = new.sum()
-    matrix, noise = _real(parts)
-    return Passage(matrix, noise, float(new[:FIXED].sum()))
+    parts[..., 1, m, m] = new.sum(-1)
+    return parts, new
 
 
 @cache

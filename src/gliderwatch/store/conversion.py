@@ -131,6 +131,14 @@ def plain_names(state: Any) -> Any:
     return state
 
 
+def foreseen_by_one_sea(state: Any) -> Any:
+    """Layout 6 to 7: the reference `tides` is foreseen by the one model of the sea; what its dives were is to
+    be learnt again, which takes a day."""
+    for memory in (state.get("settled", {}), state.get("memory", {})):
+        memory.get("estimate", {}).pop("currents", None)
+    return state
+
+
 def _array(written: Mapping[str, Any]) -> Array:
     """An array as a record holds it."""
     return np.frombuffer(base64.b64decode(written["f64"]), dtype="<f8").reshape(written["shape"])
@@ -148,7 +156,7 @@ def same(segment: Any) -> Any:
 
 
 CONVERTERS: Mapping[type, tuple[Converter, ...]] = {
-    GliderState: (typed_dives, one_sea, one_level, with_legs, plain_names),
+    GliderState: (typed_dives, one_sea, one_level, with_legs, plain_names, foreseen_by_one_sea),
     Segment: (same,),
 }
 """For each kind of record the way from layout 1 to today's: the n-th leads from layout n to n + 1. What is in
