@@ -191,9 +191,11 @@ class Fix:
     lon: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """The way of a dive in its own plane, origin at the fix before it, and the heading along it.
+    """The way of a dive in its own plane, origin at the fix before it, and the heading along it. It equals
+    none but itself, so that what follows from it can be kept: a dive comes again when its current is
+    corrected.
 
     ``t`` (s), ``x`` (m, shape (n, 2): east, north) and ``heading`` (unit vectors east, north;
     shape (n-1, 2)) that holds between t[i] and t[i+1]; a row of zeros where the glider was at

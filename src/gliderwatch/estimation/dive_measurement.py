@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from statistics import median
 
 import numpy as np
@@ -39,7 +40,7 @@ from gliderwatch.estimation.constants import (
     USUAL_PITCH,
 )
 from gliderwatch.estimation.kinematic_speed import KinematicSpeed
-from gliderwatch.model import Array, Dive, Fix, readonly
+from gliderwatch.model import Array, Dive, Fix, Track, readonly
 from gliderwatch.navigation.geodesy import displacement
 from gliderwatch.navigation.track import flown as flying_in
 
@@ -113,7 +114,28 @@ def observe(dive: Dive) -> Observation:
     """The observation of a dive. Raises ValueError where it has no track."""
     if dive.track is None:
         raise ValueError(f"the dive at {dive.t_dive:.0f} has no track: {dive.reason}")
-    track = dive.track
+    if is_unmeasured(dive):
+        return _observed(dive, dive.track)[0]
+    seen, interval = _by_compass(replace(dive, current=None))
+    if dive.current is None:
+        return seen
+    error = REPORTED if dive.current.final else PROVISIONAL
+    return replace(
+        seen,
+        current=readonly([dive.current.u, dive.current.v]),
+        current_sigma=math.hypot(error, 2 * GPS_ERROR / interval),
+    )
+
+
+@lru_cache(maxsize=64)  # a dive comes again when its current is corrected
+def _by_compass(dive: Dive) -> tuple[Observation, float]:
+    """What of a dive does not depend on its current, where its compass tells the headings."""
+    assert dive.track is not None
+    return _observed(dive, dive.track)
+
+
+def _observed(dive: Dive, track: Track) -> tuple[Observation, float]:
+    """The observation of a dive, and the time (s) between its fixes."""
     dt = np.diff(track.t)
     interval = float(dt.sum())
     flying = flying_in(track)
@@ -127,7 +149,7 @@ def observe(dive: Dive) -> Observation:
     error = REPORTED if current is None or current.final else PROVISIONAL
     heading = share @ vectors
     along = heading / max(float(np.hypot(*heading)), 1e-6)
-    return Observation(
+    seen = Observation(
         start=float(track.t[0]),
         end=float(track.t[-1]),
         ground=readonly(ground),
@@ -150,6 +172,7 @@ def observe(dive: Dive) -> Observation:
         slip=_slip(dive),
         unseen=_unseen(dt[flying]),
     )
+    return seen, interval
 
 
 def _not_logged(dive: Dive, dt: Array) -> float:
@@ -351,35 +374,44 @@ def _clipped(values: Array, low: float, high: float) -> Array:
 
 def slip_of(x: Array, slipping: Slipping) -> tuple[Array, Array]:
     """All of slip, and its standard error on one dive, at states ``x`` ((k, 5)): (k,) each."""
-    own = _clipped(x[:, OWN], SLOWEST, FASTEST)
-    drag = drag_slip(own * (1 - slipping.physics - x[:, SLIP]), slipping.usual)
-    return slipping.physics + drag + x[:, SLIP], np.hypot(drag / 2, slipping.noise)
+    return _slip_at_speed(_clipped(x[:, OWN], SLOWEST, FASTEST), x[:, SLIP], slipping)
+
+
+def _slip_at_speed(own: Array, slip: Array, slipping: Slipping) -> tuple[Array, Array]:
+    """The same at speeds W (m/s, (k,)) and values of the slip in the state."""
+    drag = drag_slip(own * (1 - slipping.physics - slip), slipping.usual)
+    return slipping.physics + drag + slip, np.hypot(drag / 2, slipping.noise)
 
 
 _SLOPE = readonly([[1, 0, 0, 0, 0], [0, 1, 0, 0, 0], [1, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0, 0, 1, 0, 0]])
 """What is always so of the slope of h: rows g, c, w; columns F, W, s, d."""
 
 
+_FLOW = np.array([0, 1, 0, 1])
+"""Places of F in the state for g and for c."""
+
+
 def expected(x: Array, measured: Measured) -> tuple[Array, Array, Array]:
     """h(x), its slope and the noise at states ``x`` ((k, 5)): (k, m), (k, m, 5), (k, m, m)."""
     seen, k = measured.seen, len(x)
-    h = seen.heading
-    aside = np.array([-h[1], h[0]])
+    east, north = seen.heading.tolist()
+    # of g, then of c: what goes with W alone is in g only
+    h, aside = np.array([east, north, east, north]), np.array([-north, east, -north, east])
+    full = np.array([east, north, 0.0, 0.0])
     own = _clipped(x[:, OWN], SLOWEST, FASTEST)
-    slip, slip_sigma = slip_of(x, measured.slipping)
+    slip, slip_sigma = _slip_at_speed(own, x[:, SLIP], measured.slipping)
+    speed = own[:, None]
     lost = slip[:, None] * h + x[:, SIDE, None] * aside
-    wrong = own[:, None] * lost
     found, slope, noise = np.empty((k, 5)), np.empty((k, 5, SHOWN)), np.zeros((k, 5, 5))
-    found[:, 2:4] = x[:, :2] - wrong
-    found[:, :2] = x[:, :2] + own[:, None] * h - wrong
+    found[:, :4] = x[:, _FLOW] + speed * full - speed * lost
     found[:, 4] = own
     slope[:] = _SLOPE
-    slope[:, :2, OWN], slope[:, 2:4, OWN] = h - lost, -lost
-    slope[:, :2, SLIP] = slope[:, 2:4, SLIP] = -own[:, None] * h
-    slope[:, :2, SIDE] = slope[:, 2:4, SIDE] = -own[:, None] * aside
-    noise[:, :2, :2] = measured.scale * (seen.ground_cov + own[:, None, None] ** 2 * seen.heading_cov)
-    noise[:, [2, 3], [2, 3]] = measured.scale * seen.current_sigma**2
-    along = ((own * slip_sigma)[:, None] * h)[:, [0, 1, 0, 1]]
+    slope[:, :4, OWN] = full - lost
+    slope[:, :4, SLIP] = -speed * h
+    slope[:, :4, SIDE] = -speed * aside
+    noise[:, :2, :2] = measured.scale * (seen.ground_cov + (speed**2)[:, :, None] * seen.heading_cov)
+    noise[:, 2, 2] = noise[:, 3, 3] = measured.scale * seen.current_sigma**2
+    along = (own * slip_sigma)[:, None] * h
     noise[:, :4, :4] += along[:, :, None] * along[:, None, :]
     if measured.kinematic is not None:
         noise[:, 4, 4] = measured.kinematic.sigma**2

@@ -477,10 +477,9 @@ def expected_flow(
     """
     n, lat = params.size, 0.0 if state.end is None else state.end.lat
     q = gauss_markov.intensities(state.x[:n], state.process_scale, params)
-    passage = gauss_markov.passage(max(start - state.t, 0.0), max(end - start, 1.0), lat, q, params)
-    at = params.mean
-    rows = passage.matrix[at]  # those of the mean flow alone
-    cov = rows @ state.cov[:n, :n] @ rows.T + passage.noise[at, at]
+    gap, time = max(start - state.t, 0.0), max(end - start, 1.0)
+    rows, noise = gauss_markov.mean_passage(gap, time, lat, q, params)
+    cov = rows @ state.cov[:n, :n] @ rows.T + noise * np.eye(2)
     now = state.x[0:2] + state.x[2:4]
     crossed = gauss_markov.crossing(now, ground, max((start + end) / 2 - state.t, 0.0), params)
     return rows @ state.x[:n], np.asarray(cov + state.process_scale * crossed**2 * np.eye(2))

@@ -40,7 +40,7 @@ from gliderwatch.estimation.constants import (
     WING_SIDE,
     WING_SLIP,
 )
-from gliderwatch.estimation.dive_measurement import OWN, SIDE, SLIP, Measured, expected
+from gliderwatch.estimation.dive_measurement import OWN, SHOWN, SIDE, SLIP, Measured, expected
 from gliderwatch.model import Array, readonly
 
 
@@ -190,11 +190,13 @@ def explain(
     if not measured.has_current:
         modes = tuple(mode for mode in modes if not mode.cause.is_error)
     kinematic = measured.kinematic
-    fits = (True, False) if kinematic is not None else (False,)
-    each = [(mode, fits_it) for mode in modes for fits_it in fits]
-    opened, wrong, logs = _opened(each, cov, jumped, measured)
-    before, values = np.repeat(x[None], len(each), axis=0), measured.values
-    before[:, SLIP] += [mode.loss for mode, _ in each]
+    values = measured.values
+    ways = _ways(modes, None if kinematic is None else kinematic.lies, len(values))
+    opened, wrong, each = cov + ways.opened, ways.wrong, ways.each
+    for k, square in ways.jumps:
+        opened[k] += square * jumped
+    before = np.repeat(x[None], len(each), axis=0)
+    before[:, SLIP] += ways.losses
     state = before
     for _ in range(ITERATIONS):
         found, slope, noise = expected(state, measured)
@@ -208,14 +210,13 @@ def explain(
         np.minimum(np.maximum(state[:, OWN:], _LOWEST), _HIGHEST, out=state[:, OWN:])
     beyond = np.maximum(np.maximum(-free, free - FASTEST), 0.0)
     squares = (innovation[:, None, :] @ inverse @ innovation[:, :, None])[:, 0, 0]
-    weights = _weights(logs, beyond, np.linalg.slogdet(s)[1] + squares)
-    left_out = wrong > 0
-    noise = np.where(left_out, LEFT_OUT**2, noise)
-    at = np.flatnonzero(left_out.any(axis=(1, 2)))
+    weights = _weights(ways.logs, beyond, np.linalg.slogdet(s)[1] + squares)
+    noise[wrong > 0] = LEFT_OUT**2
+    at = ways.with_wrong
     inverse[at] = np.linalg.inv(slope[at] @ turned[at] + noise[at])
     return [
-        Explained(mode, float(weights[k]), fits_it, slope[k], innovation[k], noise[k], inverse[k])
-        for k, (mode, fits_it) in enumerate(each)
+        Explained(mode, weight, fits_it, slope[k], innovation[k], noise[k], inverse[k])
+        for k, ((mode, fits_it), weight) in enumerate(zip(each, weights.tolist(), strict=True))
     ]
 
 
@@ -228,29 +229,47 @@ def _weights(logs: Array, beyond: Array, misfits: Array) -> Array:
     return np.asarray(weights / weights.sum())
 
 
-def _opened(
-    each: list[tuple[Mode, bool]], cov: Array, jumped: Array, measured: Measured
-) -> tuple[Array, Array, Array]:
-    """Covariances of the state ((k, 5, 5)), what is added to the noise ((k, m, m)), and logarithms of the
-    chances ((k,)), of modes and of whether the speed that the glider tells fits."""
-    kinematic, m = measured.kinematic, len(measured.values)
-    opened, wrong = np.repeat(cov[None], len(each), axis=0), np.zeros((len(each), m, m))
-    logs = np.zeros(len(each))
+@dataclass(frozen=True, slots=True)
+class _Ways:
+    """What does not depend on the dive of k modes with and without a fitting kinematic speed (``each``):
+    what is added to the covariance of the state (``opened``, (k, 5, 5)), where and by what square (m2/s2) the
+    flow steps beside that (``jumps``), what is added to the noise (``wrong``, (k, m, m)) and of which ways
+    that is any (``with_wrong``), logarithms of the chances (``logs``, (k,)), ``losses`` ((k,)) of slip."""
+
+    each: tuple[tuple[Mode, bool], ...]
+    opened: Array
+    jumps: tuple[tuple[int, float], ...]
+    wrong: Array
+    with_wrong: list[int]
+    logs: Array
+    losses: Array
+
+
+@lru_cache(maxsize=64)
+def _ways(modes: tuple[Mode, ...], lies: float | None, m: int) -> _Ways:
+    """The ways to explain a dive with m measurements, the last of them a kinematic speed that ``lies`` so
+    often (None: there is none)."""
+    fits = (True, False) if lies is not None else (False,)
+    each = tuple((mode, fits_it) for mode in modes for fits_it in fits)
+    opened, wrong = np.zeros((len(each), SHOWN, SHOWN)), np.zeros((len(each), m, m))
+    logs, jumps = np.zeros(len(each)), list[tuple[int, float]]()
     for k, (mode, fits_it) in enumerate(each):
         logs[k] = log(mode.chance)
         if mode.cause is Cause.SPEED:
-            opened[k, OWN, OWN] += mode.size**2
+            opened[k, OWN, OWN] = mode.size**2
         elif mode.cause is Cause.FLOW:
-            opened[k] += mode.size**2 * jumped
+            jumps.append((k, mode.size**2))
         elif mode.cause is Cause.WING:
-            opened[k, SLIP, SLIP] += mode.size**2
-            opened[k, SIDE, SIDE] += WING_SIDE**2
+            opened[k, SLIP, SLIP] = mode.size**2
+            opened[k, SIDE, SIDE] = WING_SIDE**2
         elif mode.cause.is_error:
             at = 2 if mode.cause is Cause.CURRENT else 0
             wrong[k, at, at] = wrong[k, at + 1, at + 1] = mode.size**2
-        if kinematic is not None:
-            logs[k] += log(1 - kinematic.lies) if fits_it else log(kinematic.lies)
+        if lies is not None:
+            logs[k] += log(1 - lies) if fits_it else log(lies)
             if not fits_it:  # it may be anything: of density 1 / FASTEST
                 wrong[k, -1, -1] = FASTEST**2
                 logs[k] += log(sqrt(2 * pi))
-    return opened, wrong, logs
+    at_fault = np.flatnonzero((wrong > 0).any(axis=(1, 2))).tolist()
+    losses = readonly([mode.loss for mode, _ in each])
+    return _Ways(each, readonly(opened), tuple(jumps), readonly(wrong), at_fault, readonly(logs), losses)

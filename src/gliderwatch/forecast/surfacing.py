@@ -150,6 +150,8 @@ WaypointLog = tuple[tuple[float, float, float], ...]
 def read_waypoints(before: WaypointLog, segment: Segment) -> WaypointLog:
     """The waypoints reported until now and those in one more segment; what changes nothing is left out."""
     t, lat, lon = joined(segment.get("waypoint_lat"), segment.get("waypoint_lon"))
+    if not len(t):
+        return before
     reported = zip(t.tolist(), lat.tolist(), lon.tolist(), strict=True)
     out: list[tuple[float, float, float]] = []
     for report in sorted({*before, *reported}):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from statistics import median
 
 from gliderwatch.forecast.constants import (
@@ -47,7 +48,7 @@ def quantile(errors: Sequence[float], usual_ones: Sequence[float], weight: float
     >>> quantile([0.0] * 60, [1.0], 1.0, 0.9)
     1.0
     """
-    weights = [memory**age for age in reversed(range(len(errors)))] + [weight] * len(usual_ones)
+    weights = _weights(len(errors), len(usual_ones), weight, memory)
     pairs = sorted(zip([*errors, *usual_ones], weights, strict=True))
     left = (1 - COVERED) * sum(weights)
     for value, share in reversed(pairs):
@@ -55,6 +56,11 @@ def quantile(errors: Sequence[float], usual_ones: Sequence[float], weight: float
         if left < 0:
             return value
     return pairs[0][0]
+
+
+@lru_cache(maxsize=256)
+def _weights(errors: int, usual_ones: int, weight: float, memory: float) -> tuple[float, ...]:
+    return (*(memory**age for age in reversed(range(errors))), *[weight] * usual_ones)
 
 
 def error(interval: float, expected: float) -> float:

@@ -141,11 +141,24 @@ def _at_surface(depth: Series, fixes: list[float]) -> float | None:
     if not fixes:
         return None
     t = np.asarray(fixes)
-    at = np.clip(np.searchsorted(t, depth.t), 1, len(t)) - 1
+    at = np.maximum(t.searchsorted(depth.t), 1) - 1
     gap = np.minimum(np.abs(depth.t - t[at]), np.abs(depth.t - t[np.minimum(at + 1, len(t) - 1)]))
     near = depth.v[gap <= NEAR]
     if len(near) < FEWEST:
         return None
-    shown = float(np.quantile(near, SHALLOW))
+    shown = _quantile(near.tolist(), SHALLOW)
     # nobody flies above the surface: a fix at which it is much deeper than elsewhere is an old one
     return shown if abs(shown) <= MOST and depth.v.min() > shown - LEAST else None
+
+
+def _quantile(values: list[float], part: float) -> float:
+    """The quantile of a few values, linear between them; numpy's is for thousands.
+
+    >>> _quantile([4.0, 1.0, 2.0], 0.25)
+    1.5
+    """
+    values = sorted(values)
+    at = part * (len(values) - 1)
+    below = int(at)
+    step = values[min(below + 1, len(values) - 1)] - values[below]
+    return values[below] + step * (at - below)

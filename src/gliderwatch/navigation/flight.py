@@ -53,10 +53,16 @@ def downsample(quantities: Mapping[str, Series]) -> dict[str, Series]:
     """
     out = {}
     for name, series in quantities.items():
-        spacing = SCIENCE_SPACING if name in _SCIENCE else SPACING
-        if name.startswith(_EXACT) or len(starts := _bins(series.t, spacing)) == len(series):
+        if name.startswith(_EXACT):
             out[name] = series
-        elif name.startswith(_FIRST):
+            continue
+        bins = np.floor(series.t / (SCIENCE_SPACING if name in _SCIENCE else SPACING))
+        others = bins[1:] != bins[:-1]
+        if others.all():  # as sparse already as it is to be
+            out[name] = series
+            continue
+        starts = np.flatnonzero(np.concatenate([[True], others]))
+        if name.startswith(_FIRST):
             out[name] = Series(readonly(series.t[starts]), readonly(series.v[starts]))
         elif name.startswith("heading"):
             mean = _mean(np.exp(1j * series.v), starts)
@@ -64,12 +70,6 @@ def downsample(quantities: Mapping[str, Series]) -> dict[str, Series]:
         else:
             out[name] = Series(readonly(_mean(series.t, starts)), readonly(_mean(series.v, starts)))
     return out
-
-
-def _bins(t: Array, spacing: float) -> NDArray[np.intp]:
-    """Index of the first sample in each bin of `spacing` seconds that holds any."""
-    bins = np.floor(t / spacing)
-    return np.flatnonzero(np.concatenate([[True], bins[1:] != bins[:-1]])) if len(t) else np.empty(0, np.intp)
 
 
 def _mean(values: NDArray[Any], starts: NDArray[np.intp]) -> NDArray[Any]:
@@ -250,9 +250,10 @@ def unseen(samples: Samples, after: float, before: float) -> Flight | None:
 
 def _is_stuck(depth: Series, pitch: Series) -> bool:
     """Whether depth is always the same number while the glider glides down and up: it is not measured."""
-    glides = _mostly_steep(pitch)
-    both = len(glides) > 0 and pitch.v.min() < -DIVING_PITCH and pitch.v.max() > DIVING_PITCH
-    return bool(len(depth) > 1 and both and np.ptp(depth.v) == 0.0)
+    if len(depth) < 2 or depth.v.min() != depth.v.max():
+        return False
+    both = len(pitch) > 0 and pitch.v.min() < -DIVING_PITCH and pitch.v.max() > DIVING_PITCH
+    return bool(both and len(_mostly_steep(pitch)) > 0)
 
 
 def _mostly_steep(pitch: Series) -> Array:
@@ -284,6 +285,6 @@ def _not_denied(t: Array, depth: Series, after: float, before: float) -> Array:
         return t
     edges = np.concatenate([[after], depth.t, [before]])
     shallow = np.concatenate([[True], depth.v <= DIVING_DEPTH, [True]])
-    i = np.clip(np.searchsorted(edges, t, "right"), 1, len(edges) - 1)
+    i = np.minimum(np.maximum(edges.searchsorted(t, "right"), 1), len(edges) - 1)
     denied = shallow[i - 1] & shallow[i] & (edges[i] - edges[i - 1] <= DENIES_DIVE)
     return np.asarray(t[~denied])

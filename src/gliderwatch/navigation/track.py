@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -107,13 +108,15 @@ def _onboard(samples: Samples, t: Array, flight: Flight, start: Fix) -> Array | 
     return np.stack([np.interp(t, times, xy[:, 0]), np.interp(t, times, xy[:, 1])], axis=-1)
 
 
+@lru_cache(maxsize=64)
 def mean_heading(track: Track) -> tuple[Array, float]:
     """Mean over the whole interval of the heading vector (zero at the surface), and seconds flown."""
-    dt = np.diff(track.t)
+    dt = track.t[1:] - track.t[:-1]
     mean = (track.heading * dt[:, None]).sum(axis=0) / (track.t[-1] - track.t[0])
-    return mean, float(dt[flown(track)].sum())
+    return readonly(mean), float(dt[flown(track)].sum())
 
 
+@lru_cache(maxsize=64)
 def flown(track: Track) -> NDArray[np.bool_]:
     """Which intervals of a track have a heading, (n - 1,): at the surface there is none."""
     return np.asarray((track.heading[:, 0] != 0) | (track.heading[:, 1] != 0))
@@ -142,11 +145,20 @@ def closure(track: Track, current: Current) -> Closure | None:
         return None
     rest = track.x[-1] / interval - np.array([current.u, current.v])
     along = float(rest @ mean) / length**2
-    headings = track.heading[flown(track)]
-    aside = (mean[0] * headings[:, 1] - mean[1] * headings[:, 0]) / length
+    spread, n = _swing(track)
     return Closure(
         along_speed=along,
         across_misfit=float(mean[0] * rest[1] - mean[1] * rest[0]) / length,
         # a heading of the track is the mean of two samples, which halves their variance
-        across_sigma=abs(along) * float(np.std(aside)) * (2 / len(aside)) ** 0.5,
+        across_sigma=abs(along) * spread * (2 / n) ** 0.5,
     )
+
+
+@lru_cache(maxsize=64)
+def _swing(track: Track) -> tuple[float, int]:
+    """By how much the headings of a track swing about their mean, as parts of a unit vector, and how many
+    they are."""
+    mean, _ = mean_heading(track)
+    headings = track.heading[flown(track)]
+    aside = (mean[0] * headings[:, 1] - mean[1] * headings[:, 0]) / float(np.hypot(*mean))
+    return float(np.std(aside)), len(aside)

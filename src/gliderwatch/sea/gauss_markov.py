@@ -203,6 +203,19 @@ def rotary_passage(gap: float, dive: float, a: Complex, q: Array) -> tuple[Compl
     return parts, new
 
 
+def mean_passage(gap: float, dive: float, lat: float, q: Array, params: FlowParams) -> tuple[Array, float]:
+    """The rows ((2, size)) of the matrix of `passage` that make the mean flow over the dive, and the variance
+    (m2/s2) of its noise in a component."""
+    a = rates(lat, params)
+    gained = q * _squared(a, gap)
+    integral = _integral(a, dive)
+    mean, (_, own) = integral / dive, _wandered(a, dive, _squared(a, dive), integral)
+    new = q * own / dive**2 + gained * np.abs(mean) ** 2
+    row = np.zeros((1, params.parts + 1), dtype=np.complex128)
+    row[0, :-1] = mean * np.exp(a * gap)
+    return _real(row), float(new.sum())
+
+
 @cache
 def jump(params: FlowParams) -> Array:
     """What a step of the lasting part before a dive does to the state, (size, 2): east and north."""
@@ -243,10 +256,10 @@ def _wandered(a: Complex, t: float, square: Array, linear: Complex) -> tuple[Com
 
 
 def _real(parts: Complex) -> Array:
-    """Complex factors ((..., k, k)) as real blocks of two by two ((..., 2 k, 2 k))."""
-    *some, k, _ = parts.shape
-    out = np.empty((*some, k, 2, k, 2))
+    """Complex factors ((..., j, k)) as real blocks of two by two ((..., 2 j, 2 k))."""
+    *some, j, k = parts.shape
+    out = np.empty((*some, j, 2, k, 2))
     out[..., 0, :, 0] = out[..., 1, :, 1] = parts.real
     out[..., 1, :, 0] = parts.imag
     out[..., 0, :, 1] = -parts.imag
-    return out.reshape(*some, 2 * k, 2 * k)
+    return out.reshape(*some, 2 * j, 2 * k)
