@@ -86,9 +86,10 @@ def _slow_leak(history: History, limits: Limits) -> Finding | None:
             part = vacuum.between(float(vacuum.t[-1]) - window, np.inf)
             if len(part) <= TREND_FILES or part.t[-1] - part.t[0] < 0.6 * window:
                 continue
-            trends = [trend(part.t[:n], part.v[:n]) for n in range(len(part), len(part) - 3, -1)]
-            slope, sigma, _ = trends[0]
-            if all(s < -least and s < -x * e for s, e, x in trends):  # also without the last, and two
+            slope, sigma, sure = trend(part.t, part.v)
+            fewer = (trend(part.t[:n], part.v[:n]) for n in (len(part) - 1, len(part) - 2))
+            falls = slope < -least and slope < -sure * sigma
+            if falls and all(s < -least and s < -x * e for s, e, x in fewer):
                 text = (
                     f"vacuum falls by {-slope * _WEEK / INHG:.2f} +- {sigma * _WEEK / INHG:.2f} inHg a week, "
                     "temperature accounted for"
@@ -110,9 +111,10 @@ def trend(t: Array, v: Array) -> tuple[float, float, float]:
     x = t - t.mean()
     weights = np.ones_like(v)
     for _ in range(5):
-        mean_x, mean_v = np.average(x, weights=weights), np.average(v, weights=weights)
-        spread_x = float(np.sum(weights * (x - mean_x) ** 2))
-        slope = float(np.sum(weights * (x - mean_x) * (v - mean_v))) / spread_x
+        total = weights.sum()
+        mean_x, mean_v = (x * weights).sum() / total, (v * weights).sum() / total
+        spread_x = float((weights * (x - mean_x) ** 2).sum())
+        slope = float((weights * (x - mean_x) * (v - mean_v)).sum()) / spread_x
         rest = v - mean_v - slope * (x - mean_x)
         scale = max(ROBUST * float(np.median(np.abs(rest))), OFF_LINE / 10)
         weights = np.minimum(1.0, 3.0 * scale / np.maximum(np.abs(rest), 1e-9))

@@ -449,9 +449,11 @@ def _currents(store: Store, glider: str, notified: NotificationState) -> list[Di
     if last is None or (before is not None and before.checked >= last.t_surface):
         return None
     currents, since = list[DiveCurrent](), last.t_surface - CHECK_WINDOW
-    found = {each: store.surfaced_between(each, since, last.t_surface) for each in store.gliders()}
-    if not any(dives for other, dives in found.items() if other != glider):
+    gliders = store.gliders()
+    others = (each for each in gliders if each != glider)
+    if not any(store.surfaced_between(each, since, last.t_surface) for each in others):
         return []  # a glider alone is compared with nothing
+    found = {each: store.surfaced_between(each, since, last.t_surface) for each in gliders}
     for dives in found.values():
         each = map(current_of, dives, [None, *dives])
         currents += [current for current in each if current is not None]

@@ -7,6 +7,7 @@ import sqlite3
 import zlib
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import lru_cache
 from typing import Any, TypeVar
 
 import msgspec
@@ -176,4 +177,10 @@ def file_of(row: sqlite3.Row) -> File:
 
 def values(db: sqlite3.Connection, sql: str, arguments: tuple[object, ...], kind: type[R]) -> list[R]:
     """The values in the first column of what a query finds. Raises DamagedError."""
-    return [plain_decode(row[0], kind) for row in db.execute(sql, arguments)]
+    return [_remembered(row[0], kind) for row in db.execute(sql, arguments)]
+
+
+@lru_cache(maxsize=256)
+def _remembered(text: str, kind: type[R]) -> R:
+    """`plain_decode` of a row: a dozen rules ask for the same dives after each file."""
+    return plain_decode(text, kind)

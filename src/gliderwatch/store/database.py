@@ -11,6 +11,7 @@ from contextlib import closing, contextmanager
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -383,7 +384,9 @@ def connect(path: Path | str, *, durable: bool = True) -> sqlite3.Connection:
         refuse_foreign(Path(path))
         _make_folder(Path(path))
     with guarded(path):
-        connection = sqlite3.connect(path, timeout=30.0, isolation_level=None, check_same_thread=False)
+        connection = sqlite3.connect(
+            path, timeout=30.0, isolation_level=None, check_same_thread=False, factory=_Connection
+        )
         try:
             if (
                 connection.execute("PRAGMA page_count").fetchone()[0] == 0
@@ -410,7 +413,8 @@ def read_only(path: Path) -> sqlite3.Connection:
         raise StateError(f"there is no state file {path}: has the daemon run with this configuration?")
     refuse_foreign(path)
     with guarded(path):
-        connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=30.0)
+        uri = f"{path.absolute().as_uri()}?mode=ro"
+        connection = sqlite3.connect(uri, uri=True, timeout=30.0, factory=_Connection)
         try:
             connection.row_factory = sqlite3.Row
             _check_version(connection.execute("PRAGMA user_version").fetchone()[0], path)
@@ -420,10 +424,24 @@ def read_only(path: Path) -> sqlite3.Connection:
     return connection
 
 
+class _Connection(sqlite3.Connection):
+    """A connection that remembers which tables it has seen: none ever goes."""
+
+    def __init__(self, *arguments: Any, **named: Any) -> None:
+        super().__init__(*arguments, **named)
+        self.seen: set[str] = set()
+
+
 def has_table(connection: sqlite3.Connection, name: str) -> bool:
     """Whether there is such a table: a file of an earlier release, not migrated yet, may be looked at."""
+    seen = connection.seen if isinstance(connection, _Connection) else set[str]()
+    if name in seen:
+        return True
     sql = "SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name = ?"
-    return connection.execute(sql, (name,)).fetchone() is not None
+    if connection.execute(sql, (name,)).fetchone() is None:
+        return False
+    seen.add(name)
+    return True
 
 
 def refuse_foreign(path: Path, cure: str = "Name another file in state.path, or move this one away") -> None:

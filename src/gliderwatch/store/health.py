@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import accumulate, pairwise
@@ -37,10 +37,17 @@ class HealthRows:
 
     def __init__(self, connection: sqlite3.Connection) -> None:
         self._db = connection
+        self._held: dict[str, dict[str, Readings]] = {}
+        """Readings of the gliders that were judged last, by source."""
+
+    def rollback(self) -> None:
+        """What was written since the last commit is not in the state file."""
+        self._held.clear()
 
     def put(self, glider: str, source: str, t: float, readings: Readings) -> None:
         """Keep the readings of a segment or call, the last of them at ``t`` (s), in place of those that its
         ``source`` had before; it and all that follow are to be judged (again)."""
+        self._held.get(glider, {}).pop(source, None)
         row = self._db.execute("SELECT t FROM health WHERE source = ?", (source,)).fetchone()
         since = t if row is None else min(t, row[0])
         self._db.execute(
@@ -61,14 +68,27 @@ class HealthRows:
         since: float | None = self._db.execute(sql, (glider,)).fetchone()[0]
         if since is None:
             return
-        sql = "SELECT t, source, readings FROM health WHERE glider = ? AND t >= ? ORDER BY t, source"
+        sql = "SELECT t, source FROM health WHERE glider = ? AND t >= ? ORDER BY t, source"
         rows = self._db.execute(sql, (glider, since - REMEMBERED)).fetchall()
-        found = judge_rows([(t, _unpacked(data)) for t, _, data in rows], since, limits)
-        sources = [source for t, source, _ in rows if t >= since]
+        held = self._readings(glider, [source for _, source in rows])
+        found = judge_rows([(t, held[source]) for t, source in rows], since, limits)
+        sources = [source for t, source in rows if t >= since]
         self._db.executemany(
             "UPDATE health SET judged = ? WHERE source = ?",
             [(codec.plain_encode(each), source) for each, source in zip(found, sources, strict=True)],
         )
+
+    def _readings(self, glider: str, sources: Sequence[str]) -> dict[str, Readings]:
+        """The readings of some sources of a glider: of a month most are held from the file before."""
+        before, sql = self._held.pop(glider, {}), "SELECT readings FROM health WHERE source = ?"
+        found = {
+            each: before[each] if each in before else _unpacked(self._db.execute(sql, (each,)).fetchone()[0])
+            for each in sources
+        }
+        while self._held and len(found) + sum(map(len, self._held.values())) > _HELD:
+            self._held.pop(next(iter(self._held)))
+        self._held[glider] = found
+        return found
 
     def readings(self, glider: str, since: float, until: float) -> Readings:
         """All readings of a glider from segments and calls of a time (s), joined by quantity."""

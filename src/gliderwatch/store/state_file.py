@@ -92,6 +92,7 @@ class Store:
             except BaseException:
                 self.segments.rollback()
                 self.fields.rollback()
+                self.health.rollback()
                 if self._db.in_transaction:  # on a full disk SQLite may have ended it by itself
                     self._db.execute("ROLLBACK")
                 raise
