@@ -242,12 +242,9 @@ class GliderFacts:
 
     def places(self, n: int) -> list[Fix]:
         """Where and when it surfaced the last `n` times that are known, in order of time."""
-        sql = (
-            "SELECT t_surface, json_extract(data, '$.lat'), json_extract(data, '$.lon') FROM assessments "
-            "WHERE glider = ? AND ended = 1 ORDER BY t_surface DESC LIMIT ?"
-        )
-        rows = self._db.execute(sql, (self.glider, n)).fetchall()
-        return [Fix(*row) for row in reversed(rows) if row[1] is not None and row[2] is not None]
+        sql = "SELECT data FROM assessments WHERE glider = ? AND ended = 1 ORDER BY t_surface DESC LIMIT ?"
+        dives = reversed(values(self._db, sql, (self.glider, n), Assessment))
+        return [Fix(a.t_surface, a.lat, a.lon) for a in dives if a.lat is not None and a.lon is not None]
 
     def arrivals(self, since: float, until: float) -> list[Arrival]:
         """Its segments of which the first file came between two times (s), in that order."""
