@@ -177,10 +177,11 @@ def file_of(row: sqlite3.Row) -> File:
 
 def values(db: sqlite3.Connection, sql: str, arguments: tuple[object, ...], kind: type[R]) -> list[R]:
     """The values in the first column of what a query finds. Raises DamagedError."""
-    return [_remembered(row[0], kind) for row in db.execute(sql, arguments)]
+    found: list[R] = [_remembered(row[0], kind) for row in db.execute(sql, arguments)]
+    return found
 
 
 @lru_cache(maxsize=256)
-def _remembered(text: str, kind: type[R]) -> R:
+def _remembered(text: str, kind: Any) -> Any:
     """`plain_decode` of a row: a dozen rules ask for the same dives after each file."""
     return plain_decode(text, kind)
