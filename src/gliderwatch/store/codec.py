@@ -177,8 +177,8 @@ def file_of(row: sqlite3.Row) -> File:
 
 def values(db: sqlite3.Connection, sql: str, arguments: tuple[object, ...], kind: type[R]) -> list[R]:
     """The values in the first column of what a query finds. Raises DamagedError."""
-    found: list[R] = [_remembered(row[0], kind) for row in db.execute(sql, arguments)]
-    return found
+    of: Any = kind  # a class can be hashed, whatever mypy makes of `type[R]`
+    return [_remembered(row[0], of) for row in db.execute(sql, arguments)]
 
 
 @lru_cache(maxsize=256)
