@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -98,9 +99,33 @@ def count(messages: Sequence[Told], hours: float) -> int:
     return sum(0 <= each.hours <= hours for each in messages)
 
 
+def words(pattern: str, text: str) -> bool:
+    """Whether a text says something, its lines as one."""
+    return re.search(pattern, " ".join(text.split())) is not None
+
+
+CONFIGURED = f"{GliderParams().speed_min:.2f}-{GliderParams().speed_max:.2f}"
+ABSURD = re.compile(r"normal \S+-1\.30|agree: \S+ m/s apart|is normal again")
+CLEARED = re.compile(r"ALL CLEAR: (\S+) m/s \(normal (?:above )?([0-9.]+)")
+
+
+def misstatements(messages: Sequence[Told]) -> list[str]:
+    """Where a message contradicts itself, or names a range that no dive of this glider made."""
+    found, is_learnt = list[str](), False
+    for each in messages:
+        text = " ".join(f"{each.alert.title}. {each.alert.body}".split())
+        found += [f"{each.hours:.0f} h: {each.alert.title}: {m[0]}" for m in ABSURD.finditer(text)]
+        if is_learnt and f"(normal {CONFIGURED})" in text:
+            found.append(f"{each.hours:.0f} h: {each.alert.title}: the range of the configuration")
+        is_learnt |= "(normal " in text and f"(normal {CONFIGURED})" not in text
+        if (end := CLEARED.search(each.alert.title)) and float(end[1]) <= float(end[2]) + 0.005:
+            found.append(f"{each.hours:.0f} h: {each.alert.title}: at its bound")
+    return found
+
+
 def wavers(messages: Sequence[Told]) -> list[str]:
-    """Where a message contradicts one before without saying why, in words."""
-    found, open_ones, over = list[str](), dict[str, Alert](), dict[Kind, float]()
+    """Where a message contradicts itself, or one before without saying why, in words."""
+    found, open_ones, over = misstatements(messages), dict[str, Alert](), dict[Kind, float]()
     found_by_rules = dict[str, Alert]()
     for hours, a in ((each.hours, each.alert) for each in messages):
         others = [each for thread, each in open_ones.items() if thread != a.incident]

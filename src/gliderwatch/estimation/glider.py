@@ -79,8 +79,7 @@ def joint_step(
     """
     after, verdict = step_speed(state.speed, dive, speed_params(params), frozen)
     if verdict.info is None:
-        flag = None if verdict.flag is None else int(verdict.flag)
-        return state, replace(unassessed(dive, params, digest, verdict.reason), flag=flag)
+        return state, _without_speed(unassessed(dive, params, digest, verdict.reason), verdict)
     found, current = verdict.info.estimate, dive.current if other is None else other.current
     flow = (float(found.flow[0]), float(found.flow[1]))
     size = hypot(current.u, current.v) if current is not None else 0.0
@@ -106,6 +105,17 @@ def joint_step(
         notes=_notes(dive, current, other),
     )
     return replace(state, speed=after, maxima=maxima), assessment
+
+
+def _without_speed(plain: Assessment, verdict: Verdict) -> Assessment:
+    """Of a dive without a track: what is normal is known all the same."""
+    return replace(
+        plain,
+        flag=None if verdict.flag is None else int(verdict.flag),
+        speed_min=verdict.normal.low,
+        speed_max=verdict.normal.high,
+        evidence={**plain.evidence, **_usual(verdict)},
+    )
 
 
 def _apart(found: JointEstimate, other: Reference) -> bool:
@@ -136,8 +146,7 @@ def _numbers(verdict: Verdict, info: JointInfo) -> dict[str, float]:
         "flow_sigma": sqrt(float(np.trace(found.flow_cov)) / 2),
         "nis": info.nis / info.dof,
     }
-    if verdict.normal.dives:
-        out |= {"usual_speed": verdict.normal.usual, "usual_dives": float(verdict.normal.dives)}
+    out |= _usual(verdict)
     if verdict.before is not None:
         out["usual_before"] = verdict.before
     if info.loss is not None:
@@ -145,6 +154,12 @@ def _numbers(verdict: Verdict, info: JointInfo) -> dict[str, float]:
     if info.across is not None:
         out["across_misfit"], out["across_sigma"] = info.across
     return out
+
+
+def _usual(verdict: Verdict) -> dict[str, float]:
+    """The usual speed, where it is learnt."""
+    normal = verdict.normal
+    return {"usual_speed": normal.usual, "usual_dives": float(normal.dives)} if normal.dives else {}
 
 
 # ----------------------------------------

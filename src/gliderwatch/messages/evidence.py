@@ -24,6 +24,8 @@ SURE = 4.0  # standard errors beyond which a misfit is one
 STRONG, MINOR = 3.0, 0.5  # weights of what decides, and of what is good to know; others: 1
 LINES = 3  # on each side, for a phone
 USUAL_SLIP = 0.08  # part of the speed that a glider reckons with, which the angle of attack takes
+DAC_ERROR = 0.02  # m/s: error of a depth-averaged current, a component
+TWO_SIGMA = 2.45  # standard errors that hold 95 % of two components
 LEARNT = 1.6  # times the usual speed: a bound above it was not learnt from dives
 CERTAIN = 0.99  # more than that is never claimed: what is modelled is not all
 _WORDS = ((0.975, "almost sure"), (0.9, "very likely"), (0.75, "likely"), (0.0, "not sure"))
@@ -183,9 +185,10 @@ def _disagreement(a: Assessment) -> list[Remark]:
     if apart is not None and p_e is not None:
         agree = p_e <= a.gamma_f
         text = f"the current estimated here and that of the glider are {speed(apart)} apart"
-        found.append(
-            Remark(not agree, f"{text}, within their errors" if agree else text, MINOR if agree else 2.0)
-        )
+        if agree:  # p_E is less than the limit beside strong currents, whatever the errors are
+            small = apart <= TWO_SIGMA * hypot(number(a, "flow_sigma") or 0.0, DAC_ERROR)
+            text += ", within their errors" if small else ", which is little beside the currents met so far"
+        found.append(Remark(not agree, text, MINOR if agree else 2.0))
     onboard = through_water(number(a, "onboard_speed"))
     if onboard is not None and not out_of_range(a, onboard):
         text = f"the glider itself reports {speed(onboard)} through the water, within the normal range"
