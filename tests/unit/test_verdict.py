@@ -181,3 +181,30 @@ def test_no_heading_is_judged_by_what_the_current_leaves():
         assert verdicts[20].info.estimate.speed == pytest.approx(0.23, abs=0.02)
         assert (Flag.ANOMALY in flags(verdicts[25:28])) == told
         assert Flag.FALSE_ALARM not in flags(verdicts)
+
+
+@pytest.mark.parametrize("own", [0.20, 0.22])
+def test_a_new_way_of_flying_is_seen_by_depth_rate_and_pitch_where_the_way_hides_it(own):
+    """Half of the speed is lost for five dives; then it flies flatter, and what the way leaves is half of
+    its speed, as of a glider that turned and no heading says so: depth rate and pitch say all is well."""
+    made = ways(30, 3, lambda k: 0.7 * (k // 5))
+    made[15:20] = [slower(way, 0.5) for way in made[15:20]]
+    hidden = 0.12 * np.array([[math.cos(way.heading), math.sin(way.heading)] for way in made])
+    made[20:] = [
+        replace(way, speed=0.92 * own, own=own, wrong=tuple(wrong))
+        for way, wrong in zip(made[20:], hidden[20:].tolist(), strict=True)
+    ]
+    dives = []
+    for k, (way, each) in enumerate(zip(made, mission(made), strict=True)):
+        pitch = 0.45 if k < 20 else 0.35
+        rate = way.own * math.tan(pitch)
+        angles = {"pitch_dive": -pitch, "pitch_climb": pitch}
+        rates = {"depth_rate_dive": rate, "depth_rate_climb": -rate}
+        dives.append(replace(each, features=replace(each.features, heading_reckoned=True, **angles, **rates)))
+    _, verdicts = run(dives)
+    assert flags(verdicts[16:20]) == [Flag.ANOMALY] * 4
+    assert flags(verdicts[20:23]) == [None, None, Flag.NORMAL]
+    assert "flies in a new way" in verdicts[22].reason
+    speed, sigma = verdicts[22].by_reckoning
+    assert speed == pytest.approx(0.92 * own, abs=0.01) and sigma < 0.03
+    assert set(flags(verdicts[22:])) == {Flag.NORMAL}

@@ -152,6 +152,7 @@ def _left(shape: Array, across: Array, sigma: Array) -> float:
 MONTH = 30 * 86400.0
 """s"""
 NOT_SEEN = "it turned, and its heading is not in the file: the speed cannot be told"
+SLOW_OR_TURNED = "slow, or it turned while its heading was not seen: the next dive will tell"
 FASTER = "faster than ever: the current is wrong, or it is driven harder"
 NEW_FASTER = "faster than before: a new way of flying, or the current is wrong: the next dives will tell"
 NEW_SLOWER = "slower than before, after a change of pitch or ballast: the next dives will tell"
@@ -250,16 +251,22 @@ def step(
         reason = NOT_SEEN if assumed else reason
         flag, reason = _by_reckoning(reason, state, kinematic, normal, params)
         if flag is not None and kinematic is not None:
-            left = 1 - _usual_slip(params)
-            return state, Verdict(
-                flag, reason, normal, info, (kinematic.speed * left, kinematic.sigma * left)
-            )
+            return state, Verdict(flag, reason, normal, info, _reckoned(kinematic, params))
     earlier = normal
     state, flag, reason, normal = _regime(state, dive, info, kinematic, normal, flag, reason, params)
     before = earlier.usual if reason.startswith(NEW_WAY) else None
     if flag is Flag.NORMAL and not frozen and not state.other:
         state = replace(_learnt(state, dive, info, at, params), trim=_trim(dive))
-    return state, Verdict(flag, reason, normal, info, before=before)
+    # where the way hardly shows the speed, it is depth rate and pitch that a new way of flying is seen by
+    is_hidden = before is not None and info.estimate.speed < normal.low
+    reckoned = _reckoned(kinematic, params) if is_hidden and kinematic is not None else None
+    return state, Verdict(flag, reason, normal, info, reckoned, before)
+
+
+def _reckoned(kinematic: KinematicSpeed, params: SpeedParams) -> tuple[float, float]:
+    """The speed through the water and its standard error (m/s) by depth rate and pitch alone."""
+    left = 1 - _usual_slip(params)
+    return kinematic.speed * left, kinematic.sigma * left
 
 
 def _regime(
@@ -282,12 +289,13 @@ def _regime(
     faster = reason == FASTER
     if flag is Flag.FALSE_ALARM and not faster:
         return state, flag, reason, normal  # it says nothing of the way of flying
-    is_vague = info.estimate.own_sigma > OWN_SURE * normal.usual or (flag is None and reason == NOT_SEEN)
+    has_turned = flag is None and reason in (NOT_SEEN, SLOW_OR_TURNED)
+    is_vague = info.estimate.own_sigma > OWN_SURE * normal.usual or has_turned
     if is_vague and not faster and kinematic is not None and kinematic.is_prompt:
         speed = kinematic.speed * (1 - _usual_slip(params))
     explained = speed > EXPLAINED * normal.usual and retrimmed(state.trim, _trim(dive))
-    is_slow = flag is Flag.ANOMALY or (is_vague and speed < normal.low)
-    slower = is_slow and explained and kinematic is not None and info.kinematic_fits
+    is_slow = flag is Flag.ANOMALY or has_turned or (is_vague and speed < normal.low)
+    slower = is_slow and explained and kinematic is not None and (info.kinematic_fits or has_turned)
     if learning is None or not normal.dives or not (faster or slower):
         return (replace(state, other=()) if state.other else state), flag, reason, normal
     if faster and kinematic is not None and not info.kinematic_fits:
@@ -387,8 +395,7 @@ def _slow_or_fast(
         # depth rate and pitch would be slow as well; where they are not sent a second dive has to be slow
         unseen = info.seen.is_free and (kinematic is not None or not state.doubted)
         if believed is None and (unseen or (not state.doubted and _may_have_turned(info, normal))):
-            reason = "slow, or it turned while its heading was not seen: the next dive will tell"
-            return replace(state, doubted=1), None, reason
+            return replace(state, doubted=1), None, SLOW_OR_TURNED
         return state, Flag.ANOMALY, _how_slow(info, normal, params)
     state = replace(state, doubted=0)
     if info.estimate.speed - sigma > normal.high:
