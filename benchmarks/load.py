@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from aiosmtpd.controller import Controller
-from common import GLIDERWATCH, configure, daemon, folder, machine, memory, tree
+from common import GLIDERWATCH, busy, configure, daemon, folder, machine, memory, tree
 from rich.console import Console
 from rich.table import Table
 
@@ -136,6 +136,14 @@ class Log:
             time.sleep(0.05)
 
 
+@dataclass(frozen=True, slots=True)
+class Tenth:
+    """What a file of a tenth of the backlog took: seconds on the ``clock``, and of all processors."""
+
+    clock: float
+    cpu: float
+
+
 @dataclass(slots=True)
 class Figures:
     """What was measured."""
@@ -144,6 +152,8 @@ class Figures:
     size: float = 0.0
     floor: float = 0.0
     rate: float = 0.0
+    cpu: float = 0.0
+    tenths: list[Tenth] = field(default_factory=list)
     late: list[float] = field(default_factory=list)
     unordered: int = 0
     differing: list[str] = field(default_factory=list)
@@ -203,18 +213,21 @@ def watched_memory(pid: int, figures: Figures) -> Iterator[None]:
         thread.join()
 
 
-def backlog(where: Path, fleet: Fleet, log: Log, segments: int, figures: Figures) -> None:
-    """Wait for the backlog; meanwhile a file of another glider comes every now and then."""
+def backlog(where: Path, fleet: Fleet, log: Log, pid: int, figures: Figures) -> None:
+    """Wait for the backlog; meanwhile a file of another glider comes every now and then. What a file of each
+    tenth costs shows whether the last one costs what the first one did."""
     deadline = time.monotonic() + LONGEST
     while log.look() < 1 and time.monotonic() < deadline:
         time.sleep(0.02)
     begun, already = time.monotonic(), len(log.taken)
+    spent = [(already, begun, busy(tree(pid)))]
     coming = [file for g in fleet.newcomers for file in fleet.files(g, 0, 4)]
     pause = max(0.2, min(5.0, figures.files / 100 / 1.3 / max(1, len(coming))))
     pending: dict[str, float] = {}
     due, total = begun + pause, figures.files
     while len(log.taken) < total + len(figures.late) + len(pending):
-        log.look()
+        if log.look() >= spent[-1][0] + (total - already) / 10:
+            spent.append((len(log.taken), time.monotonic(), busy(tree(pid))))
         for name in [name for name in pending if name in log.taken]:
             figures.late.append(log.taken[name] - pending.pop(name))
         if coming and not pending and time.monotonic() >= due and len(log.taken) < total:
@@ -224,7 +237,13 @@ def backlog(where: Path, fleet: Fleet, log: Log, segments: int, figures: Figures
         if time.monotonic() > deadline:
             sys.exit(f"only {len(log.taken)} files taken within {LONGEST:g} s")
         time.sleep(0.02)
+    if len(log.taken) > spent[-1][0]:
+        spent.append((len(log.taken), time.monotonic(), busy(tree(pid))))
     figures.rate = (len(log.taken) - already) / (time.monotonic() - begun)
+    figures.tenths = [
+        Tenth((t1 - t0) / (b - a), (c1 - c0) / (b - a)) for (a, t0, c0), (b, t1, c1) in pairwise(spent)
+    ]
+    figures.cpu = (spent[-1][2] - spent[0][2]) / (spent[-1][0] - spent[0][0])
 
 
 def unordered(fleet: Fleet, log: Log, segments: int) -> int:
@@ -314,6 +333,11 @@ def report(figures: Figures, arguments: argparse.Namespace) -> None:
     table.add_row("backlog", size, "")
     table.add_row("dbdreader alone, 2 processes", f"{f.floor:.0f} files/s", "")
     table.add_row("gliderwatch", f"{f.rate:.0f} files/s, {1000 / f.rate:.1f} ms a file", "")
+    table.add_row("processor time of all", f"{1000 * f.cpu:.1f} ms a file", "")
+    rates = ", ".join(f"{1 / t.clock:.3g}" for t in f.tenths)
+    costs = ", ".join(f"{1000 * t.cpu:.3g}" for t in f.tenths)
+    table.add_row("files/s in each tenth", rates, "alike")
+    table.add_row("processor time in each tenth", f"{costs} ms a file", "alike")
     table.add_row("ratio of the rates", f"{f.rate / f.floor:.3f}", ">= 0.5")
     table.add_row("most memory (PSS)", f"{f.peak:.0f} MB", "< 500 MB")
     table.add_row("state file", f"{f.state:.0f} MB, {1000 * f.state / f.files:.1f} kB a file", "")
@@ -359,7 +383,7 @@ def main() -> None:
             figures.floor = floor(random.Random(2).sample(paths, min(SAMPLE, len(paths))), where / "cache")
             log = Log(config.with_name("daemon.log"))
             with daemon(config) as pid, watched_memory(pid, figures):
-                backlog(where, fleet, log, arguments.segments, figures)
+                backlog(where, fleet, log, pid, figures)
                 figures.unordered = unordered(fleet, log, arguments.segments)
                 figures.differing = differing(where, config, fleet.gliders[:2])
                 figures.state = sum(p.stat().st_size for p in (where / "state").iterdir()) / 1e6

@@ -22,14 +22,13 @@ from gliderwatch.store import conversion, retention
 from gliderwatch.store.conversion import moved
 from gliderwatch.store.maintenance import damage
 from gliderwatch.store.outbox import Outbox
-from gliderwatch.store.segments import RECENT
 from gliderwatch.store.state_file import File, Status, Store
 from missions import Leg, ending, feed, mission, opened
 
 PARAMS = GliderParams(speed_min=0.2, speed_max=0.4, speed_learnt=False)
 ALL = Routing(channels=lambda alert: ["mail"], notices=lambda glider: False)
 HEALTHY, SICK = Leg(speed=0.3), Leg(speed=0.08)
-LEGS = [SICK if 4 <= k < 8 else replace(HEALTHY, heading=0.3 * k) for k in range(RECENT + 26)]
+LEGS = [SICK if 4 <= k < 8 else replace(HEALTHY, heading=0.3 * k) for k in range(90)]
 CUT = opened(LEGS, 70)
 TABLES = ("segments", "assessments", "incidents", "expected", "heard", "said", "alerts", "outbox", "files")
 
@@ -106,7 +105,7 @@ def test_a_file_that_is_too_late_is_known_as_such(store):
 def test_the_first_checkpoint_is_not_thinned_out(store):
     clear(store)
     first = store._db.execute("SELECT name FROM segments ORDER BY opened_at LIMIT 1").fetchone()[0]
-    more = [*LEGS, *(replace(HEALTHY, heading=1.0 + k) for k in range(RECENT))]
+    more = [*LEGS, *(replace(HEALTHY, heading=1.0 + k) for k in range(64))]
     feed(mission(more)[len(LEGS) :], PARAMS, ALL, store)
     sql = "SELECT checkpoint IS NOT NULL FROM segments WHERE name = ?"
     assert store._db.execute(sql, (first,)).fetchone()[0] == 1
@@ -159,7 +158,7 @@ def test_an_incident_that_is_over_goes_with_what_was_said_of_it(store):
 
 
 def test_an_open_incident_keeps_all_that_is_since():
-    legs = [HEALTHY if k < 20 else SICK for k in range(RECENT + 26)]
+    legs = [HEALTHY if k < 20 else SICK for k in range(90)]
     store = feed(mission(legs), PARAMS, ALL)
     store._db.execute("UPDATE outbox SET delivered_at = 1.0")
     before, (incident,) = content(store), store.incidents("unit")

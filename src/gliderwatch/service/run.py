@@ -24,7 +24,7 @@ from gliderwatch.model import Segment
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
 from gliderwatch.sea.ocean_field import Field
-from gliderwatch.store.codec import encode
+from gliderwatch.store.codec import encode_state
 from gliderwatch.store.segments import Plan
 
 
@@ -69,7 +69,7 @@ def processed_for_another(run: Run, params: GliderParams, is_kept: Sequence[bool
     """Process a run in a worker: what is not to be kept is not sent back."""
     done = processed(run, params, None)
     *before, last = done.outcomes
-    records = [encode(one.state) if kept else None for one, kept in zip(before, is_kept, strict=False)]
+    records = [encode_state(one.state) if kept else None for one, kept in zip(before, is_kept, strict=False)]
     bare = [replace(one, state=GliderState()) for one in before]
     return Processed(run.plan, (*bare, last), (*records, last.state))
 

@@ -376,7 +376,7 @@ def _keep(
         dives = {t: a for t, a in dives.items() if t < outcome.since} | {
             a.t_dive: a for a in outcome.assessments
         }
-    store.segments.thin(first.glider)
+    store.segments.thin(first)
     return tuple(dives.values()), done.outcomes[-1].state
 
 

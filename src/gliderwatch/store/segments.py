@@ -213,8 +213,10 @@ class CheckpointCache:
 # ----------------------------------------
 # The segments of each glider in a state file, and the checkpoints after them.
 
-RECENT = 64
-"""Newest segments of a glider that all keep their checkpoint."""
+RECENT = 8
+"""Newest segments of a glider that all keep their checkpoint: before them comes most of what comes late."""
+LATELY, CLOSE = 64, 4
+"""Of so many newest one in so many does."""
 SPARSE = 16
 """Of the older ones one in this many does. Its name decides, so that no order of arrival matters."""
 
@@ -323,7 +325,7 @@ class Segments:
                 segment.id.opened_at + correction.offset,
                 name,
                 codec.plain_encode(segment.completeness),
-                _is_milestone(name),
+                _is_one_in(SPARSE, name),
                 segment.last_t,
                 correction.offset,
                 correction.step,
@@ -474,7 +476,7 @@ class Segments:
 
     def is_kept(self, name: str, behind: int) -> bool:
         """Whether the state after a segment is written where so many files are at hand behind it."""
-        return behind < RECENT or _is_milestone(name)
+        return behind < RECENT or _is_one_in(CLOSE if behind < LATELY else SPARSE, name)
 
     def checkpoint(
         self, identity: SegmentId, state: GliderState | bytes | None, expected: NextSurfacing | None
@@ -489,7 +491,7 @@ class Segments:
                 self.ahead.keep(identity, state)
             else:
                 self.ahead.drop(identity.glider)
-            record = codec.encode(state) if self.is_kept(identity.name, self.following) else None
+            record = codec.encode_state(state) if self.is_kept(identity.name, self.following) else None
         self._db.execute(
             "UPDATE segments SET checkpoint = ?1 WHERE glider = ?2 AND opened_at = ?3 AND name = ?4 "
             "AND (?1 IS NOT NULL OR checkpoint IS NOT NULL)",
@@ -514,22 +516,31 @@ class Segments:
             row = (glider, "", expected.after, expected.after, codec.plain_encode(expected))
             self._db.execute("INSERT INTO expected VALUES (?, ?, ?, ?, ?)", row)
 
-    def thin(self, glider: str) -> None:
-        """Let go of the checkpoints that are not among the `RECENT` newest, but for one in `SPARSE`."""
+    def thin(self, first: SegmentId) -> None:
+        """Let go of checkpoints that are not `is_kept`, after a segment and all later ones were processed.
+
+        What is further back was thinned before, so that a long mission costs no more than a short one.
+        """
+        glider = first.glider
+        newest = "SELECT opened_at, name FROM segments WHERE glider = ?1 ORDER BY opened_at DESC, name DESC"
+        since = self._db.execute(f"{newest} LIMIT 1 OFFSET ?2", (glider, 2 * LATELY)).fetchone()
+        lately = self._db.execute(f"{newest} LIMIT 1 OFFSET ?2", (glider, LATELY - 1)).fetchone()
         rows = self._db.execute(  # of the index alone: `milestone` lies behind the long records of its row
             "SELECT opened_at, name FROM segments WHERE glider = ?1 AND checkpoint IS NOT NULL "
-            "AND (opened_at, name) < "
-            "(SELECT opened_at, name FROM segments WHERE glider = ?1 "
-            "ORDER BY opened_at DESC, name DESC LIMIT 1 OFFSET ?2)",
-            (glider, RECENT - 1),
+            f"AND (opened_at, name) < ({newest} LIMIT 1 OFFSET ?2) AND opened_at >= ?3",
+            (glider, RECENT - 1, float("-inf") if since is None else min(since[0], first.opened_at)),
         ).fetchall()
         self._db.executemany(
             f"UPDATE segments SET checkpoint = NULL WHERE glider = ? AND opened_at = ? AND name = ? "
             f"AND milestone != {FIRST}",
-            [(glider, *row) for row in rows if not _is_milestone(row["name"])],
+            [
+                (glider, *row)
+                for row in map(tuple, rows)
+                if not _is_one_in(CLOSE if lately is None or row >= tuple(lately) else SPARSE, row[1])
+            ],
         )
 
 
-def _is_milestone(name: str) -> bool:
-    """Whether the checkpoint of a segment is kept for good."""
-    return zlib.crc32(name.encode()) % SPARSE == 0
+def _is_one_in(n: int, name: str) -> bool:
+    """Whether a segment is the one in ``n`` that keeps its checkpoint."""
+    return zlib.crc32(name.encode()) % n == 0

@@ -26,7 +26,7 @@ from gliderwatch.store.health import HealthRows
 from gliderwatch.store.relays import RelayState, relay_state
 from gliderwatch.store.results import Annotations, Calls, GliderFacts
 from gliderwatch.store.sea import Fields, LayerRows
-from gliderwatch.store.segments import RECENT, Segments
+from gliderwatch.store.segments import LATELY, Segments
 
 __all__ = ["File", "GliderFacts", "Status", "Store", "Undelivered"]
 
@@ -48,7 +48,7 @@ class Store:
         Where it is not, few checkpoints are written: what can be run again comes in the order of time.
         """
         store = cls(connect(path, durable=durable), path)
-        store.segments.following = 0 if durable else RECENT
+        store.segments.following = 0 if durable else LATELY
         return store
 
     @classmethod
