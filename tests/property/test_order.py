@@ -107,8 +107,10 @@ def test_taking_back_and_going_on_comes_to_the_same_as_in_one_go(there, params):
 
 @pytest.fixture
 def thinned(monkeypatch):
-    """Two checkpoints are kept of the newest segments, and hardly any of the older ones."""
+    """Two checkpoints are kept of the newest segments, some of the next, and hardly any of the older ones."""
     monkeypatch.setattr(segments, "RECENT", 2)
+    monkeypatch.setattr(segments, "LATELY", 6)
+    monkeypatch.setattr(segments, "CLOSE", 2)
     monkeypatch.setattr(segments, "SPARSE", 3)
 
 
@@ -122,18 +124,19 @@ def test_any_order_with_few_checkpoints(thinned, there):
 def test_few_checkpoints_are_kept(thinned):
     store = feed(mission([Leg(hours=1.0)] * 25)[::-1])
     kept = store._db.execute("SELECT count(*) FROM segments WHERE checkpoint IS NOT NULL").fetchone()[0]
-    assert 2 + 3 <= kept <= 2 + 16  # one in three of 23 older ones, as their names fall
+    assert 2 + 3 <= kept <= 2 + 16  # one in two of 4, one in three of 19 older ones, as their names fall
     passing = store._db.execute(
         "SELECT count(*) FROM segments WHERE checkpoint IS NOT NULL AND NOT milestone"
     ).fetchone()[0]
-    assert passing <= 2
+    assert passing <= 2 + 4
 
 
 def test_with_many_segments_old_checkpoints_go():
     """The numbers of the service."""
     store = feed(mission([Leg(hours=0.3)] * 200))
     kept = store._db.execute("SELECT count(*) FROM segments WHERE checkpoint IS NOT NULL").fetchone()[0]
-    assert segments.RECENT <= kept <= segments.RECENT + 3 * (200 - segments.RECENT) / segments.SPARSE
+    lately = segments.RECENT + 2 * (segments.LATELY - segments.RECENT) / segments.CLOSE
+    assert segments.RECENT <= kept <= lately + 3 * (200 - segments.LATELY) / segments.SPARSE
 
 
 @settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow])

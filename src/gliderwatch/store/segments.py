@@ -476,7 +476,7 @@ class Segments:
 
     def is_kept(self, name: str, behind: int) -> bool:
         """Whether the state after a segment is written where so many files are at hand behind it."""
-        return behind < RECENT or _is_one_in(CLOSE if behind < LATELY else SPARSE, name)
+        return behind < RECENT or (behind < LATELY and _is_one_in(CLOSE, name)) or _is_one_in(SPARSE, name)
 
     def checkpoint(
         self, identity: SegmentId, state: GliderState | bytes | None, expected: NextSurfacing | None
@@ -536,7 +536,8 @@ class Segments:
             [
                 (glider, *row)
                 for row in map(tuple, rows)
-                if not _is_one_in(CLOSE if lately is None or row >= tuple(lately) else SPARSE, row[1])
+                if not _is_one_in(SPARSE, row[1])
+                and not (_is_one_in(CLOSE, row[1]) and (lately is None or row >= tuple(lately)))
             ],
         )
 
