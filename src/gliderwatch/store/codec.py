@@ -39,8 +39,8 @@ def encode(value: object) -> bytes:
 
 
 def encode_state(value: object) -> bytes:
-    """The same of a state, not packed: nearly all of it is numbers that differ in all their bits. To pack them
-    takes twice as long as to assess a dive, for a third of the room."""
+    """The same of a state, not packed: nearly all of it is numbers that differ in all their bits. To pack
+    them takes twice as long as to assess a dive, for a third of the room."""
     return zlib.compress(_record(value), 0)
 
 
