@@ -173,3 +173,15 @@ def test_trend_is_over_after_two_days_of_files() -> None:
     (still,) = health_incidents("a", [leak(0, True), *(leak(k, False) for k in range(1, 16))])
     (over,) = health_incidents("a", [leak(0, True), *(leak(k, False) for k in range(1, 17))])
     assert still.cleared_at is None and over.cleared_at is not None
+
+
+def test_the_reminders_of_an_incident_of_dives_are_those_of_what_is_not_worse() -> None:
+    """One fault, an oil leak: slow, and a poor vacuum. Two rows of reminders would be twelve in 15 days."""
+    long, worse = rows(*[W] * 60), rows(*[C] * 60)
+    for found, reminded, expected in ((long, W, 0), (long, C, 0), (long, None, 4), (worse, W, 4)):
+        threads: tuple[HealthThread, ...] = ()
+        kinds = []
+        for n in range(1, len(found) + 1):
+            threads, due = announce(threads, "a", found[:n], None, {}, 24.0, (), reminded)
+            kinds += [type(each.content) for each in due]
+        assert kinds == [HealthFound] + [HealthReminder] * expected

@@ -16,7 +16,12 @@ from gliderwatch.incidents.acknowledgement import Acks
 from gliderwatch.incidents.constants import GONE
 from gliderwatch.incidents.facts import informed
 from gliderwatch.incidents.notices import Irregularity, Notice
-from gliderwatch.incidents.notifications import IncidentFacts, NotificationState, due_notifications
+from gliderwatch.incidents.notifications import (
+    IncidentFacts,
+    NotificationState,
+    due_notifications,
+    holds_acknowledgement,
+)
 from gliderwatch.incidents.open_threads import unacknowledged
 from gliderwatch.incidents.overdue import SilenceFacts
 from gliderwatch.incidents.unjudged import WatchFacts
@@ -141,8 +146,18 @@ def _of_health(
     """What the rules of health found; the fix is asked for where there is anything to say."""
     if not notified.health and not any(any(judged.values()) for _, judged in rows):
         return notified, []
-    fix = facts.last_fix(now - GONE)
+    fix, open_ones = facts.last_fix(now - GONE), [t for t in notified.threads if t.is_open]
+    reminded = [
+        t.reported.severity for t in open_ones if not holds_acknowledgement(t, t.reported, wanted.acks)
+    ]
     threads, notices = health.announce(
-        notified.health, facts.glider, rows, fix, wanted.acks, wanted.reminder_hours, facts.incidents()
+        notified.health,
+        facts.glider,
+        rows,
+        fix,
+        wanted.acks,
+        wanted.reminder_hours,
+        facts.incidents(),
+        max(reminded, default=None),
     )
     return replace(notified, health=threads), notices

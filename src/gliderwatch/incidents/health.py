@@ -90,13 +90,19 @@ class HealthThread:
 @dataclass(frozen=True, slots=True)
 class _Now:
     """What decides on the notices that are due: the ``latest`` reading (s), the last fix, acks, and the
-    ``rolling`` anomalies of dives."""
+    ``rolling`` anomalies of dives. The reminders of dives at a severity of ``reminded`` (None: there are
+    none) name what is open of health as well."""
 
     latest: float
     fix: Fix | None
     acks: Acks
     reminder_hours: float | None
     rolling: tuple[Incident, ...]
+    reminded: Severity | None
+
+    def is_named(self, incident: HealthIncident) -> bool:
+        """Whether the reminders of an incident of dives are its reminders: one fault has one row of them."""
+        return self.reminded is not None and incident.severity <= self.reminded
 
     def is_explained(self, incident: HealthIncident) -> bool:
         """Whether an anomaly stands for it: one fault is one incident. Of a roll that goes on only one that
@@ -117,17 +123,19 @@ def announce(
     acks: Acks,
     reminder_hours: float | None,
     anomalies: Iterable[Incident] = (),
+    reminded: Severity | None = None,
 ) -> tuple[tuple[HealthThread, ...], list[Notice]]:
     """What people have been notified of after the notices that are due, and these.
 
     `rows` is what the rules found in the segments and calls, in order of time (s); `fix` the glider's
     last. Of what somebody has acknowledged (`acks`) nobody is reminded, unless it has grown worse. The
-    `anomalies` of dives of which the roll is evidence stand for what is found of the roll.
+    `anomalies` of dives of which the roll is evidence stand for what is found of the roll; where people are
+    reminded of one, as severe (`reminded`), they are of this by the same message.
     """
     if not rows:
         return before, []
     rolling = tuple(i for i in anomalies if i.kind is Kind.ANOMALY and (_rolls(i.worst) or _rolls(i.last)))
-    now = _Now(rows[-1][0], fix, acks, reminder_hours, rolling)
+    now = _Now(rows[-1][0], fix, acks, reminder_hours, rolling, reminded)
     incidents = health_incidents(glider, rows)
     matched = _matched(before, incidents)
     threads, notices = list[HealthThread](), list[Notice]()
@@ -196,7 +204,8 @@ def _continued(
     if thread.is_over or incident.severity > thread.reported.severity:
         thread, notices = _notified(thread, incident, HealthFound(incident, not thread.is_over, now.fix), now)
         return replace(thread, is_over=False), notices
-    is_wanted = not is_acknowledged(now.acks, (incident.id, thread.id), incident.severity)
+    is_acked = is_acknowledged(now.acks, (incident.id, thread.id), incident.severity)
+    is_wanted = not is_acked and not now.is_named(incident)
     if is_wanted and is_reminder_due(incident.opened_at, thread.time, now.latest, now.reminder_hours):
         reminder = HealthReminder(incident, (now.latest - incident.since) / 3600, now.fix)
         return _notified(thread, incident, reminder, now)

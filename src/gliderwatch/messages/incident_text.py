@@ -89,9 +89,10 @@ def still_open(glider: str, content: StillOpen) -> Text:
     incident, latest, now = content.incident, content.dive, content.situation
     age, name = duration(content.hours * 3600), name_of(glider)
     (label, take), *_ = take_on(incident, now)
+    also = "".join(f" So is the {what} since {utc(since)}." for what, since in still_open_ones(now))
     page = Page(
         (
-            f"{name}: the {_name(incident)} since {utc(incident.since)} is still open, after {age}.",
+            f"{name}: the {_name(incident)} since {utc(incident.since)} is still open, after {age}.{also}",
             _course(incident, latest, now),
             where(now.last or latest, is_flow_sure=incident.kind is not Kind.FALSE_ALARM),
             next_call(now.expected),
