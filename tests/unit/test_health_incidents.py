@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from alert_support import SLOW, incident
+from dives_by_letters import Talk
 from gliderwatch.health.rule import Finding
 from gliderwatch.health.rules import RULES
 from gliderwatch.incidents.acknowledgement import acknowledge_thread
@@ -185,3 +186,12 @@ def test_the_reminders_of_an_incident_of_dives_are_those_of_what_is_not_worse() 
             threads, due = announce(threads, "a", found[:n], None, {}, 24.0, (), reminded)
             kinds += [type(each.content) for each in due]
         assert kinds == [HealthFound] + [HealthReminder] * expected
+
+
+def test_the_reminder_of_an_incident_names_what_is_open_of_health() -> None:
+    talk = Talk()
+    talk.update("0110")
+    threads, _ = announce((), "electa", rows(W, W), None, {}, 24.0)
+    talk.notified = replace(talk.notified, health=threads)
+    assert talk.update("0110" + "1" * 12) == ["reminder"]
+    assert "So is the vacuum since " in " ".join(talk.alerts[-1].body.split())

@@ -22,6 +22,7 @@ from gliderwatch.incidents.notices import (
     NewRegime,
     Notice,
     Opened,
+    Situation,
     StillOpen,
     Surfaced,
 )
@@ -315,8 +316,13 @@ def _opened(
 def _cleared(incident: Incident, moment: _Moment, *, is_first: bool = False) -> Cleared:
     """That an incident is over, with the dive that cleared it and what goes on."""
     end = incident.cleared_at if incident.cleared_at is not None else float("inf")
-    now = replace(situation(moment.facts, incident.id), health=moment.health)
-    return Cleared(incident, moment.facts.last_surfacing(end) or incident.last, now, is_first)
+    last = moment.facts.last_surfacing(end) or incident.last
+    return Cleared(incident, last, _what_goes_on(incident, moment), is_first)
+
+
+def _what_goes_on(incident: Incident, moment: _Moment) -> Situation:
+    """How it stands beside an incident, with what rules of health found."""
+    return replace(situation(moment.facts, incident.id), health=moment.health)
 
 
 def _continued(thread: Thread, now: Incident | None, moment: _Moment) -> tuple[Thread, list[Notice]]:
@@ -339,7 +345,7 @@ def _continued(thread: Thread, now: Incident | None, moment: _Moment) -> tuple[T
     is_quiet = now.cleared_at is not None or holds_acknowledgement(thread, now, moment.acks)
     if not is_quiet and is_reminder_due(now.opened_at, thread.time, latest.t_surface, moment.reminder_hours):
         hours = (latest.t_surface - now.since) / 3600
-        return _message(thread, StillOpen(now, latest, hours, situation(facts, now.id)), moment)
+        return _message(thread, StillOpen(now, latest, hours, _what_goes_on(now, moment)), moment)
     return thread, []
 
 
