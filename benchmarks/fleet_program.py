@@ -1,13 +1,14 @@
 """The experiment of paper 003 through the installed program: simulated files in, maps of the sea out.
 
-    python benchmarks/fleet_program.py [--gliders 15] [--hours 2] [--days 7] [--seed 1] [--json out.json]
+    python benchmarks/fleet_program.py [--gliders 1 5 10 15 20] [--hours 1 2 3] [--days 7] [--seed 1]
+        [--json out.json] [--figure out.svg]
 
 Slocums fly in the box of `fleet_field.py` (whose sea, `gliderwatch.simulate.stand_in`, is their temperature),
-with currents, fixes, CTD and files of theirs, at about 0.4 m/s. At each surfacing each goes on to where the
-gradient of the mean variance leads, as the library says it of the samples so far. The files then go through
-`gliderwatch run --replay` and `gliderwatch field --at`, and the maps are held against the sea. The other two
-estimators get the batches that the program kept, in the order of the surfacings. Columns as in
-`fleet_field.py`; and what the replay cost.
+with currents, fixes, CTD and files of theirs, at the 0.54 m/s of the paper. At each surfacing each goes on to
+where the gradient of the mean variance leads, as the library says it of the samples so far. The files then go
+through `gliderwatch run --replay` and `gliderwatch field --at`, and the maps are held against the sea: by
+what was measured until then. The two other estimators get the batches that the program kept, in the order of
+the surfacings. Cells that `--json` holds already are not flown again. Columns as in `fleet_field.py`.
 """
 
 from __future__ import annotations
@@ -15,18 +16,22 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
 import tempfile
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from itertools import product
 from pathlib import Path
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # beside other work two threads wait for each other
+
 import numpy as np
-from common import cost, machine
-from fleet_field import DAY, HOUR, Nodes, Pooled, score
+from common import Cost, cost, machine
+from fleet_field import DAY, HOUR, Cell, Nodes, Pooled, Result, draw, score, table
 from netCDF4 import Dataset
 
 from gliderwatch.fleet.advice import Box, Leg, gradient
 from gliderwatch.fleet.scalar_field import Batch, FieldParams, inverse
-from gliderwatch.model import Array
 from gliderwatch.simulate import stand_in
 from gliderwatch.simulate.delivery import write_cache, write_mission
 from gliderwatch.simulate.flight import Point, offset
@@ -36,13 +41,26 @@ from gliderwatch.simulate.scenario import Mission, Scenario
 from gliderwatch.simulate.scenario_files import find, load_scenario
 from gliderwatch.store.state_file import Store
 
-SIDE, SPEED, EVERY = 60e3, 0.4, 12
+SIDE, SPEED, DRIVE, EVERY = 60e3, 0.54, 455e-6, 12
+"""m; m/s through the water, and the drive (m3) that it takes; h between two maps."""
+Scores = list[tuple[float, float]]
 
 
-def scenarios(gliders: int, hours: float, days: float, seed: int) -> list[Scenario]:
-    """The fleet, as `gliderwatch simulate --scenario field` has it, but for its intervals."""
-    base = load_scenario(find("field"))
-    return fleet(replace(base, seed=seed, days=days, interval=hours * HOUR, interval_range=None), gliders)
+@dataclass(frozen=True)
+class Experiment:
+    """One fleet: gliders, mean time between surfacings (h), days, and chance."""
+
+    gliders: int
+    hours: float
+    days: int
+    seed: int
+
+    @property
+    def missions(self) -> list[Scenario]:
+        """The fleet, as `gliderwatch simulate --scenario field` has it, at the paper's speed and intervals."""
+        base = load_scenario(find("field"))
+        whole = replace(base, seed=self.seed, days=self.days, interval=self.hours * HOUR, interval_range=None)
+        return fleet(replace(whole, drive=DRIVE, surface_segments=False), self.gliders)
 
 
 def box_of(origin: Point) -> Box:
@@ -53,7 +71,7 @@ def box_of(origin: Point) -> Box:
 
 def write_files(folder: Path, missions: list[Scenario]) -> None:
     """Fly the fleet by the gradient and write its files."""
-    box, params = box_of(missions[0].origin), FieldParams()
+    box, params = box_of(missions[0].origin or missions[0].place), FieldParams()
     field, hours = Pooled(params), missions[0].interval
 
     def answer(sent: Mission) -> Point | None:
@@ -103,7 +121,20 @@ def samples(sent: Mission, box: Box) -> Batch | None:
     return Batch(f"{name}-{every[-1]:.0f}", name, start, place, np.zeros(len(every)), stand)
 
 
-def maps(folder: Path, times: list[float], start: float, state: str) -> list[tuple[float, float]]:
+def replayed(folder: Path, missions: list[Scenario]) -> Cost:
+    """Let the installed program take all files."""
+    box = box_of(missions[0].origin or missions[0].place)
+    (folder / "g.yml").write_text(
+        f"dockserver: {{roots: [{folder / 'gliders'}], cache: [{folder / 'cache'}]}}\n"
+        f"state: {{path: {folder / 'state.sqlite'}}}\ndefaults: {{neighbours: false}}\n"
+        f"fields: {{upper: {{box: {{south: {box.south}, west: {box.west}, north: {box.north}, "
+        f"east: {box.east}}}, depth: [0, 100]}}}}\n"
+        f"gliders: {{{', '.join(f'{m.glider}: {{}}' for m in missions)}}}\n"
+    )
+    return cost("run", "-c", folder / "g.yml", "--replay", folder / "gliders", "--out", folder / "out")
+
+
+def maps(folder: Path, times: list[float], start: float, state: str) -> Scores:
     """Relative error and NEES of the maps that the program writes."""
     out = []
     for t in times:
@@ -128,66 +159,70 @@ def kept_batches(path: Path) -> list[Batch]:
     return sorted(found, key=lambda each: each.t[-1])
 
 
-def others(batches: list[Batch], times: list[float], start: float) -> dict[str, list[tuple[float, float]]]:
-    """Consensus and literal by the same batches."""
-    out: dict[str, list[tuple[float, float]]] = {}
-    for method in ("consensus", "literal"):
-        params = FieldParams("literal") if method == "literal" else FieldParams()
-        nodes, left, out[method] = Nodes(params), list(batches), []
-        for t in times:
-            while left and left[0].t[-1] <= t:
-                batch = left.pop(0)
-                shifted = Batch(batch.id, batch.glider, batch.t - start, batch.place,
-                                batch.value - stand_in.MEAN, batch.stand)  # fmt: skip
-                nodes.meet(shifted)
-            out[method].append(score(nodes.at(t - start), t - start, params))
+def others(method: str, batches: list[Batch], times: list[float], start: float) -> Scores:
+    """Consensus or literal by the same batches."""
+    params = FieldParams("literal") if method == "literal" else FieldParams()
+    nodes, left, out = Nodes(params), list(batches), []
+    for t in times:
+        while left and left[0].t[-1] <= t:
+            batch = left.pop(0)
+            shifted = replace(batch, t=batch.t - start, value=batch.value - stand_in.MEAN)
+            nodes.meet(shifted)
+        out.append(score(nodes.at(t - start), t - start, params))
     return out
 
 
-def settled(found: list[tuple[float, float]], times: list[float], start: float) -> Array:
-    """Means of error and NEES from the first day on."""
-    return np.mean([pair for pair, t in zip(found, times, strict=True) if t >= start + DAY], axis=0)
+def run(experiment: Experiment) -> Iterator[Result]:
+    """One fleet: what came of it by each of the three."""
+    with tempfile.TemporaryDirectory(prefix="gliderwatch-benchmark-") as name:
+        folder, missions = Path(name), experiment.missions
+        write_files(folder, missions)
+        n, start = len(list((folder / "gliders").rglob("*.sbd"))), missions[0].start
+        took = replayed(folder, missions)
+        print(f"{experiment}: {n} surfacings, {1e3 * took.cpu / n:.0f} ms of processor each", flush=True)
+        times = [start + h * HOUR for h in range(EVERY, experiment.days * 24 + 1, EVERY)]
+        state = str(folder / "out" / "replay.sqlite")
+        batches = kept_batches(Path(state))
+        for method in ("pooled", "consensus", "literal"):
+            pooled = method == "pooled"
+            found = maps(folder, times, start, state) if pooled else others(method, batches, times, start)
+            error, nees = zip(*found, strict=True)
+            cell = Cell(experiment.gliders, experiment.hours, experiment.days, method, experiment.seed)
+            yield Result(cell, tuple((t - start) / HOUR for t in times), error, nees)
+
+
+def results_of(path: Path | None) -> list[Result]:
+    """The results that an earlier run left."""
+    if path is None or not path.exists():
+        return []
+    rows = json.loads(path.read_text())
+    return [Result(Cell(**row["cell"]), *map(tuple, (row["t"], row["error"], row["nees"]))) for row in rows]
 
 
 def main() -> None:
     """Fly, replay, score, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--gliders", type=int, default=15)
-    parser.add_argument("--hours", type=float, default=2.0)
-    parser.add_argument("--days", type=float, default=7.0)
+    parser.add_argument("--gliders", type=int, nargs="+", default=[1, 5, 10, 15, 20])
+    parser.add_argument("--hours", type=float, nargs="+", default=[1.0, 2.0, 3.0])
+    parser.add_argument("--days", type=int, default=7)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--figure", type=Path)
     options = parser.parse_args()
     print(machine())
-    with tempfile.TemporaryDirectory(prefix="gliderwatch-benchmark-") as name:
-        folder = Path(name)
-        missions = scenarios(options.gliders, options.hours, options.days, options.seed)
-        write_files(folder, missions)
-        n = len(list((folder / "gliders").rglob("*.sbd")))
-        print(f"{n} flight files written", flush=True)
-        box, start = box_of(missions[0].origin), missions[0].start
-        (folder / "g.yml").write_text(
-            f"dockserver: {{roots: [{folder / 'gliders'}], cache: [{folder / 'cache'}]}}\n"
-            f"state: {{path: {folder / 'state.sqlite'}}}\ndefaults: {{neighbours: false}}\n"
-            f"fields: {{upper: {{box: {{south: {box.south}, west: {box.west}, north: {box.north}, "
-            f"east: {box.east}}}, depth: [0, 100]}}}}\n"
-            f"gliders: {{{', '.join(f'{m.glider}: {{}}' for m in missions)}}}\n"
-        )
-        took = cost("run", "-c", folder / "g.yml", "--replay", folder / "gliders", "--out", folder / "out")
-        print(f"replay: {took.cpu:.0f} s of processor, {1e3 * took.cpu / n:.0f} ms a surfacing", flush=True)
-        times = [start + h * HOUR for h in range(EVERY, int(options.days * 24) + 1, EVERY)]
-        state = str(folder / "out" / "replay.sqlite")
-        found = {"pooled": maps(folder, times, start, state)}
-        found |= others(kept_batches(Path(state)), times, start)
-    print("method     gliders  hours  error 24 h   at the end   24 h on    NEES 24 h on")
-    for method, pairs in found.items():
-        late, nees = settled(pairs, times, start)
-        day, end = pairs[int(24 / EVERY) - 1][0], pairs[-1][0]
-        print(f"{method:9}  {options.gliders:7d}  {options.hours:5.1f}  {day:10.3f}  {end:11.3f}  {late:8.3f}"
-              f"  {nees:13.2f}", flush=True)  # fmt: skip
-    if options.json:
-        hours = [(t - start) / HOUR for t in times]
-        options.json.write_text(json.dumps({"options": vars(options) | {"json": ""}, "t": hours, **found}))
+    results = results_of(options.json)
+    done = {(r.cell.gliders, r.cell.hours, r.cell.days, r.cell.seed) for r in results}
+    for hours, gliders in product(options.hours, options.gliders):
+        if (gliders, hours, options.days, options.seed) in done:
+            continue
+        results += run(Experiment(gliders, hours, options.days, options.seed))
+        if options.json:
+            options.json.write_text(json.dumps([asdict(result) for result in results]))
+    results.sort(key=lambda r: (("pooled", "consensus", "literal").index(r.cell.method), r.cell.hours,
+                                r.cell.gliders))  # fmt: skip
+    print("\n".join(table(results)))
+    if options.figure:
+        draw(results, options.figure)
 
 
 if __name__ == "__main__":

@@ -119,8 +119,11 @@ def look(
     out = list[FieldAdvice]()
     leg = _leg(store, glider, state)
     for field in fields:
+        if field.outputs is None:  # nobody looks at it now
+            store.fields.keep_up(field.name, field.params)
+            continue
         newest = store.fields.advance(field.name, field.params)
-        if newest is None or leg is None or field.outputs is None:
+        if newest is None or leg is None:
             continue
         t, way = leg
         found = _advice(store, field, glider, newest, t, way)

@@ -74,6 +74,10 @@ class Request:
             return glider == self.glider
         return self.config is None or glider in self.config.gliders
 
+    def compares(self, glider: str) -> bool:
+        """Whether the dives of a glider are compared with those of its neighbours."""
+        return self.config is None or self.config.attention(glider).neighbours
+
 
 @dataclass(slots=True)
 class Report:
@@ -131,7 +135,7 @@ def replay(
             for call in calls:
                 _process_log(call, report, request, routing, on_file)
         if request.out is not None:
-            _write(request.out, report.store)
+            _write(request.out, report.store, request)
     return report
 
 
@@ -389,8 +393,10 @@ def _count(
     on_file(outcome)
 
 
-def _write(out: Path, store: Store) -> None:
+def _write(out: Path, store: Store, request: Request) -> None:
     fleet = [store.assessments(glider) for glider in store.gliders()]
-    seen = beside_neighbours(chain.from_iterable(fleet), fleet)
-    write_lines(out / ASSESSMENTS, map(assessment_line, seen))
+    dives = list(chain.from_iterable(fleet))
+    seen = iter(beside_neighbours((dive for dive in dives if request.compares(dive.glider)), fleet))
+    lines = (next(seen) if request.compares(dive.glider) else dive for dive in dives)
+    write_lines(out / ASSESSMENTS, map(assessment_line, lines))
     write_lines(out / ALERTS, (alert_line(a) for a in store.alerts()))

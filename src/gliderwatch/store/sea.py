@@ -90,6 +90,16 @@ class Fields:
         self._thin(field)
         return whole[-1] if whole else None
 
+    def keep_up(self, field: str, params: FieldParams) -> None:
+        """As `advance`, once samples of more than a block of bins have come: who looks at a field has no more
+        than that to wait for."""
+        held = self._newest.get(field, ())
+        start = held[-1] if held else self._start(field, inf)
+        sql = "SELECT max(last_t) FROM field_batches WHERE field = ?"
+        last = self._db.execute(sql, (field,)).fetchone()[0]
+        if last is not None and (start is None or last // BIN > start.bin + BLOCK):
+            self.advance(field, params)
+
     def newest(self, field: str, params: FieldParams) -> Checkpoint | None:
         """What is known of a field after its last samples; None: there are none."""
         return self.before(field, inf, params)
