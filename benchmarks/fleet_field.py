@@ -216,7 +216,9 @@ def draw(results: Sequence[Result], path: Path) -> None:
     methods = list(dict.fromkeys(r.cell.method for r in results))
     rows = sorted({r.cell.hours for r in results})
     size = (3.4 * len(methods), 2.4 * len(rows) + 0.6)
-    figure, axes = plt.subplots(len(rows), len(methods), figsize=size, sharex=True, sharey=True, squeeze=False)
+    figure, axes = plt.subplots(
+        len(rows), len(methods), figsize=size, sharex=True, sharey=True, squeeze=False
+    )
     for (row, hours), (column, method) in product(enumerate(rows), enumerate(methods)):
         axis = axes[row][column]
         for r in results:

@@ -27,7 +27,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # beside other work two thre
 
 import numpy as np
 from common import Cost, cost, machine
-from fleet_field import DAY, HOUR, Cell, Nodes, Pooled, Result, draw, score, table
+from fleet_field import HOUR, Cell, Nodes, Pooled, Result, draw, score, table
 from netCDF4 import Dataset
 
 from gliderwatch.fleet.advice import Box, Leg, gradient
@@ -57,7 +57,7 @@ class Experiment:
 
     @property
     def missions(self) -> list[Scenario]:
-        """The fleet, as `gliderwatch simulate --scenario field` has it, at the paper's speed and intervals."""
+        """The fleet of `gliderwatch simulate --scenario field`, at the paper's speed and intervals."""
         base = load_scenario(find("field"))
         whole = replace(base, seed=self.seed, days=self.days, interval=self.hours * HOUR, interval_range=None)
         return fleet(replace(whole, drive=DRIVE, surface_segments=False), self.gliders)

@@ -6,7 +6,7 @@ import numpy as np
 
 from gliderwatch.fleet.cross_check import Check, Hypothesis
 from gliderwatch.fleet.flow import DiveCurrent, Fault, FleetFlow
-from gliderwatch.fleet.reference import FleetReference
+from gliderwatch.fleet.reference import FleetReference, Standing
 from gliderwatch.incidents.neighbours import Comparison, announce
 from gliderwatch.messages.notice_text import render
 from gliderwatch.model import Fix, Kind, Severity
@@ -25,10 +25,17 @@ SURE, CLEAR = beside(LOSS), beside(None)
 ALL = beside(replace(LOSS, glider="", fault=Fault.TURN))
 
 
+def stood(found: FleetReference | None) -> tuple[Standing | None, FleetReference | None]:
+    """How it stood, and the flow that is asked for only where there is a fault."""
+    if found is None:
+        return None, None
+    return Standing(found.check, found.fault), None if found.fault is None else found
+
+
 def reported(*found: FleetReference | None):
     state, out = None, []
     for k, each in enumerate(found):
-        state, notices = announce("a", state, each, T + k * 3 * HOUR)
+        state, notices = announce("a", state, *stood(each), T + k * 3 * HOUR)
         out += notices
     return state, [render(each) for each in out]
 
@@ -52,7 +59,7 @@ def test_it_is_not_reported_again_for_a_week_nor_called_over():
 
 def test_what_all_share_is_one_message_for_all():
     first = reported(ALL)[1][0]
-    _, notices = announce("b", Comparison(T), ALL, T + 3 * HOUR)
+    _, notices = announce("b", Comparison(T), *stood(ALL), T + 3 * HOUR)
     other = render(notices[0])
     assert first.id == other.id
     assert first.severity == Severity.WARNING

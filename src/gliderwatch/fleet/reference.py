@@ -25,12 +25,20 @@ Mean = tuple[Array, Array]
 
 
 @dataclass(frozen=True, slots=True)
+class Standing:
+    """How a glider stands to its neighbours at its last surfacing: the ``check``, and the ``fault`` that was
+    sure at it and at the one before (None: nothing)."""
+
+    check: Check
+    fault: Hypothesis | None
+
+
+@dataclass(frozen=True, slots=True)
 class FleetReference:
     """The flow on the ``last`` dive of a glider by its fleet.
 
     ``others``: by the other gliders alone. ``fused``: by these, by what the glider measured before (until its
-    fault, if it has one) and by a model, each weighed by its covariance. ``check`` is how it stands to its
-    neighbours, ``fault`` what was sure at this surfacing and at the one before (None: nothing).
+    fault, if it has one) and by a model, each weighed by its covariance. ``check``, ``fault``: a `Standing`.
     """
 
     last: DiveCurrent
@@ -40,13 +48,10 @@ class FleetReference:
     fault: Hypothesis | None
 
 
-def fleet_reference(
-    currents: Sequence[DiveCurrent], glider: str, model: Mean | None = None
-) -> FleetReference | None:
-    """The reference of the last dive of a glider; None where nobody is near.
+def standing(currents: Sequence[DiveCurrent], glider: str) -> Standing | None:
+    """How a glider stands to its neighbours; None where nobody is near.
 
-    ``currents`` are those of all gliders, in any order; what ended after that dive does not count. ``model``
-    is the flow on the dive by an ocean model or a radar.
+    ``currents`` are those of all gliders, in any order; what ended after its last dive does not count.
     """
     ends = sorted(each.end.t for each in currents if each.glider == glider)[-IN_A_ROW:]
     if not ends:
@@ -58,8 +63,23 @@ def fleet_reference(
     fault = check.sure
     if fault is not None and (len(ends) < IN_A_ROW or not all(_shows(each, fault) for each in checks)):
         fault = None
-    known = [each for each in currents if each.end.t <= ends[-1]]
-    last = max((each for each in known if each.glider == glider), key=lambda each: each.end.t)
+    return Standing(check, fault)
+
+
+def fleet_reference(
+    currents: Sequence[DiveCurrent], glider: str, model: Mean | None = None, stands: Standing | None = None
+) -> FleetReference | None:
+    """The reference of the last dive of a glider; None where nobody is near.
+
+    ``currents`` as of `standing`; ``model`` is the flow on the dive by an ocean model or a radar; ``stands``
+    is how it stands to its neighbours (None: that is still to be found).
+    """
+    stands = standing(currents, glider) if stands is None else stands
+    if stands is None:
+        return None
+    check = stands.check
+    last = max((each for each in currents if each.glider == glider), key=lambda each: each.end.t)
+    known = [each for each in currents if each.end.t <= last.end.t]
     believed, own = _without_faults(known, check), check.sure
     is_own = own is not None and own.glider == glider
     sea, until = (own.sea, own.since) if own is not None and is_own else (check.sea, last.start.t)
@@ -68,7 +88,7 @@ def fleet_reference(
     if others is None or both is None:
         return None
     fused = (both.flow, both.cov) if model is None else _fused((both.flow, both.cov), model)
-    return FleetReference(last, others, fused, check, fault)
+    return FleetReference(last, others, fused, check, stands.fault)
 
 
 def _checks(currents: Sequence[DiveCurrent], glider: str, ends: Sequence[float]) -> Iterator[Check | None]:

@@ -9,7 +9,7 @@ from typing import Protocol
 
 from gliderwatch.fleet.advice import Advice
 from gliderwatch.fleet.flow import DiveCurrent
-from gliderwatch.fleet.reference import fleet_reference
+from gliderwatch.fleet.reference import fleet_reference, standing
 from gliderwatch.health.rules import Judged
 from gliderwatch.incidents import aborts, calls, health, irregularities, neighbours, overdue, unjudged
 from gliderwatch.incidents.acknowledgement import Acks
@@ -118,8 +118,12 @@ def _of_fleet(
     last = None if currents is None else facts.last_surfacing(inf)
     if currents is None or last is None:
         return notified, []
-    found = fleet_reference(currents, last.glider)
-    compared, notices = neighbours.announce(last.glider, notified.neighbours, found, last.t_surface)
+    stands, reference = standing(currents, last.glider), None
+    if stands is not None and stands.fault is not None:  # the flow is for its message alone
+        reference = fleet_reference(currents, last.glider, stands=stands)
+    compared, notices = neighbours.announce(
+        last.glider, notified.neighbours, stands, reference, last.t_surface
+    )
     return replace(notified, neighbours=compared), notices
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from gliderwatch.fleet.flow import Fault
-from gliderwatch.fleet.reference import FleetReference
+from gliderwatch.fleet.reference import FleetReference, Standing
 from gliderwatch.incidents.constants import NEIGHBOURS_AGAIN
 from gliderwatch.incidents.notices import DiffersFromNeighbours, Notice
 from gliderwatch.model import Kind, Severity
@@ -27,21 +27,26 @@ class Comparison:
 
 
 def announce(
-    glider: str, before: Comparison | None, found: FleetReference | None, surfaced: float
+    glider: str,
+    before: Comparison | None,
+    stands: Standing | None,
+    reference: FleetReference | None,
+    surfaced: float,
 ) -> tuple[Comparison, list[Notice]]:
     """How a glider stands after one more surfacing (s), and what is to be reported.
 
-    ``found`` is the comparison at it, None where nobody is near. A fault is reported once, and then not again
+    ``stands``: how it stood to its neighbours at it, None where nobody is near; ``reference``: the flow at it
+    by them, where they show a fault. A fault is reported once, and then not again
     for some days. That it is over is never reported: after as many days a fault that lasts is what is usual,
     and shows no more than none.
     """
     state = replace(before or Comparison(surfaced), checked=surfaced)
     if state.id and surfaced - state.since > NEIGHBOURS_AGAIN:
         state = replace(state, id="")
-    if found is None:
+    if stands is None:
         return state, []
-    state = replace(state, fault=None if found.fault is None else found.fault.fault)
-    return (state, []) if found.fault is None or state.id else _begun(glider, state, found)
+    state = replace(state, fault=None if stands.fault is None else stands.fault.fault)
+    return (state, []) if reference is None or state.id else _begun(glider, state, reference)
 
 
 def _begun(glider: str, state: Comparison, reference: FleetReference) -> tuple[Comparison, list[Notice]]:

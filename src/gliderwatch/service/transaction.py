@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from math import inf
 from typing import TypeVar
 
-from gliderwatch.fleet.constants import CHECK_WINDOW
+from gliderwatch.fleet.constants import CHECK_WINDOW, NEAR
 from gliderwatch.fleet.cross_check import current_of
 from gliderwatch.fleet.flow import DiveCurrent
 from gliderwatch.health.readings import of_call, of_segment
@@ -449,12 +449,11 @@ def _currents(store: Store, glider: str, notified: NotificationState) -> list[Di
     if last is None or (before is not None and before.checked >= last.t_surface):
         return None
     currents, since = list[DiveCurrent](), last.t_surface - CHECK_WINDOW
-    gliders = store.gliders()
-    others = (each for each in gliders if each != glider)
-    if not any(store.surfaced_between(each, since, last.t_surface) for each in others):
+    near = store.surfaced_near(last, since, 2 * NEAR)
+    if not any(other != glider for other in near):
         return []  # a glider alone is compared with nothing
-    found = {each: store.surfaced_between(each, since, last.t_surface) for each in gliders}
-    for dives in found.values():
+    for other in near:
+        dives = store.surfaced_between(other, since, last.t_surface)
         each = map(current_of, dives, [None, *dives])
         currents += [current for current in each if current is not None]
     return currents

@@ -5,8 +5,10 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from gliderwatch.incidents.notifications import NotificationState
 from gliderwatch.model import (
@@ -18,6 +20,7 @@ from gliderwatch.model import (
     Unusable,
 )
 from gliderwatch.navigation.clock import SAME_OPENING, ClockStep
+from gliderwatch.navigation.geodesy import to_plane
 from gliderwatch.pipeline import GliderState, Outcome
 from gliderwatch.store import codec, outbox, retention, segments
 from gliderwatch.store.codec import File, Status, Undelivered, file_of, values
@@ -29,6 +32,14 @@ from gliderwatch.store.sea import Fields, LayerRows
 from gliderwatch.store.segments import LATELY, Segments
 
 __all__ = ["File", "GliderFacts", "Status", "Store", "Undelivered"]
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where a dive ended (degrees), of all that its row holds."""
+
+    lat: float | None = None
+    lon: float | None = None
 
 
 class Store:
@@ -218,6 +229,24 @@ class Store:
             "ORDER BY t_surface"
         )
         return values(self._db, sql, (glider, start, end), Assessment)
+
+    def surfaced_near(self, dive: Assessment, start: float, distance: float) -> list[str]:
+        """Gliders that came up within ``distance`` (m) of the end of a dive, from a time (s) on until then.
+
+        That of the dive is one. Of rows only the places are decoded.
+        """
+        sql = "SELECT data FROM assessments WHERE glider = ? AND ended = 1 AND t_surface BETWEEN ? AND ?"
+        if dive.lat is None or dive.lon is None:
+            return []
+        out = list[str]()
+        for glider in self.gliders():
+            rows = self._db.execute(sql, (glider, start, dive.t_surface))
+            places = [codec.plain_decode(row[0], _Place) for row in rows]
+            fixes = [(each.lat, each.lon) for each in places if each.lat is not None and each.lon is not None]
+            lat, lon = np.array(fixes, dtype=np.float64).reshape(-1, 2).T
+            if (np.hypot(*to_plane(lat, lon, dive.lat, dive.lon).T) <= distance).any():
+                out.append(glider)
+        return out
 
     def incidents(self, glider: str) -> list[Incident]:
         """All of a glider, in order of time."""
