@@ -1,10 +1,13 @@
-"""Many missions on Dask: one worker, two, two of a scheduler of which one is killed on the way.
+"""Many missions on Dask: one worker on one core, two on two, two of a scheduler, one killed on the way.
 
 `python benchmarks/cluster.py [--missions 200] [--days 1.5] [--kept build/cluster]`: simulated missions as
-files sent, healthy and faulty, judged by `gliderwatch hindcast` as installed. Printed: time on the clock and
-of all processors of each run, missions a minute, how many times as fast as with one worker, the load of the
-machine as each began, and whether all reports are equal to the byte (`report.pdf` and the state of the
-replay, which hold the time of their making, apart). `--kept` keeps the missions, which are made once.
+files sent, healthy and faulty, judged by `gliderwatch hindcast` as installed. One worker gets one core
+(`taskset`), as it decodes in a process of its own that would use a second one. Printed of each run: time on
+the clock, of all processors, and of the busiest worker; missions a minute; how many times as fast as one
+worker, by the clock and by processors (time of all with one worker, through that of the busiest of two and of
+the command that hands out); the load of the machine; and whether all reports are equal to the byte
+(`report.pdf` and the state of the replay, which hold the time of their making, apart). `--kept` keeps the
+missions, which are made once.
 """
 
 from __future__ import annotations
@@ -19,10 +22,10 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from common import GLIDERWATCH, Cost, busy, folder, machine, tree
+from common import GLIDERWATCH, busy, folder, machine, tree
 
 from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
@@ -100,26 +103,59 @@ def kill_one(nanny: int) -> str:
     return "no worker to kill"
 
 
-def run(places: list[Path], out: Path, options: list[object], beside: list[int], kill: bool) -> Cost:
-    """Judge all missions; ``beside`` are processes of workers that are there already, of which one is killed
-    when a third is done."""
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What a run took (s): on the ``clock``, of all ``processors``, of the ``busiest`` worker, and of the
+    process that ``hands`` out."""
+
+    clock: float
+    processors: float
+    busiest: float
+    hands: float
+
+
+def spent(root: int) -> float:
+    """Time of processor (s) of a process and all below it; 0 where it is gone."""
+    try:
+        return busy(tree(root))
+    except (FileNotFoundError, ProcessLookupError):
+        return 0.0
+
+
+def run(
+    places: list[Path], out: Path, options: list[object], beside: list[int], kill: bool, cores: str
+) -> Run:
+    """Judge all missions on some cores; ``beside`` are processes of workers that are there already, of which
+    one is killed when a third is done."""
     shutil.rmtree(out, ignore_errors=True)
-    command = [GLIDERWATCH, "hindcast", *places, "--out", out, *map(str, options)]
+    command = ["taskset", "-c", cores, GLIDERWATCH, "hindcast", *places, "--out", out, *map(str, options)]
     print(f"  load {os.getloadavg()[0]:.1f} at the start", flush=True)
-    before, begun = sum(busy(tree(pid)) for pid in beside), time.monotonic()
+    before, begun = {pid: spent(pid) for pid in beside}, time.monotonic()
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    while kill and process.poll() is None:
+    workers, whole = dict[int, float](), 0.0
+    while process.poll() is None:
         time.sleep(0.2)
-        if ready(out) >= len(places) / 3:
+        for pid in [*beside, *(pid for pid in tree(process.pid)[1:] if parent(pid) == process.pid)]:
+            workers[pid] = max(workers.get(pid, 0.0), spent(pid) - before.get(pid, 0.0))
+        whole = max(whole, spent(process.pid))
+        if kill and ready(out) >= len(places) / 3:
             print(f"  {kill_one(beside[-1])} when {ready(out)} were done", flush=True)
             kill = False
     _, words = process.communicate()
-    wall = time.monotonic() - begun
+    clock = time.monotonic() - begun
     if process.returncode:
         sys.exit(f"gliderwatch hindcast ended with {process.returncode}: {words}")
-    spent = os.times()
-    after = sum(busy(tree(pid)) for pid in beside)
-    return Cost(wall, spent.children_user + spent.children_system + after - before)
+    of_others = sum(workers.get(pid, 0.0) for pid in beside)
+    hands = max(whole + of_others - sum(workers.values()), 0.0)
+    return Run(clock, whole + of_others, max(workers.values()), hands)
+
+
+def parent(pid: int) -> int:
+    """The parent of a process; 0 where it is gone."""
+    try:
+        return int(Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[1])
+    except (FileNotFoundError, ProcessLookupError):
+        return 0
 
 
 def reports(out: Path) -> dict[str, str]:
@@ -132,11 +168,15 @@ def reports(out: Path) -> dict[str, str]:
     }
 
 
-def show(name: str, n: int, cost: Cost, one: Cost | None) -> None:
-    faster = "" if one is None else f", {one.wall / cost.wall:.2f} times as fast"
+def show(name: str, n: int, made: Run, one: Run | None) -> None:
+    """Print what a run took, and how many times as fast as ``one`` worker it was."""
     print(
-        f"{name:<44}{cost.wall:7.0f} s, {cost.cpu:6.0f} s of processors, {60 * n / cost.wall:.1f}/min{faster}"
+        f"{name:<44}{made.clock:7.0f} s, {made.processors:6.0f} s of processors, busiest worker "
+        f"{made.busiest:.0f} s, {60 * n / made.clock:.1f}/min"
     )
+    if one is not None:
+        by_processors = one.processors / (made.busiest + made.hands)
+        print(f"  {one.clock / made.clock:.2f} times as fast by the clock, {by_processors:.2f} by processors")
 
 
 def main() -> None:
@@ -148,19 +188,18 @@ def main() -> None:
     print(machine(), flush=True)
     places, n = missions(options.kept.resolve(), options.missions, options.days), options.missions
     outs = [options.kept.resolve() / name for name in ("one", "two", "scheduler")]
-    spent, one = 0.0, None
-    for workers, out in ((1, outs[0]), (2, outs[1])):
-        cost = run(places, out, ["--workers", workers], [], False)
-        cost, spent = Cost(cost.wall, cost.cpu - spent), cost.cpu
-        show(f"{workers} worker{'s' if workers > 1 else ''}", n, cost, one)
-        one = one or cost
+    one = None
+    for workers, out, cores in ((1, outs[0], "0"), (2, outs[1], "0,1")):
+        made = run(places, out, ["--workers", workers], [], False, cores)
+        show(f"{workers} worker{'s' if workers > 1 else ''} on {workers} core", n, made, one)
+        one = one or made
     with cluster(2) as (address, processes):
-        cost = run(places, outs[2], ["--cluster", address], processes, True)
-        show("--cluster, 2 workers, one killed on the way", n, Cost(cost.wall, cost.cpu - spent), one)
-    made = [reports(out) for out in outs]
-    unlike = {name for name in made[0] for other in made[1:] if other.get(name) != made[0][name]}
-    same = not unlike and len({len(each) for each in made}) == 1
-    print(f"{len(made[0])} files of each run: " + ("all equal" if same else f"{sorted(unlike)[:9]} differ"))
+        made = run(places, outs[2], ["--cluster", address], processes, True, "0,1")
+        show("--cluster, 2 workers, one killed on the way", n, made, one)
+    found = [reports(out) for out in outs]
+    unlike = {name for name in found[0] for other in found[1:] if other.get(name) != found[0][name]}
+    same = not unlike and len({len(each) for each in found}) == 1
+    print(f"{len(found[0])} files of each run: " + ("all equal" if same else f"{sorted(unlike)[:9]} differ"))
     again = run_again(places, outs[2])
     print(f"once more, all done already: {again:.1f} s")
 
