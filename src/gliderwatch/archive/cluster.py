@@ -24,6 +24,16 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 PATIENCE = "15s"
 """How long a scheduler that is named may take to answer, and to have a worker."""
+START_PATIENCE = "10m"
+"""How long a worker here may take to load all, on a machine that is busy with other work."""
+_STEADY = {
+    "distributed.comm.timeouts.connect": START_PATIENCE,
+    "distributed.comm.timeouts.tcp": START_PATIENCE,
+    "distributed.scheduler.worker-ttl": None,
+    "distributed.deploy.lost-worker-timeout": START_PATIENCE,
+}
+"""On one machine a worker that is silent is only slow: given up after 15 or 30 s, it would never be replaced.
+One that dies closes its connection, and is started again at once."""
 START = "DASK_DISTRIBUTED__WORKER__DAEMON=False dask worker {} --nthreads 1"
 """How a worker is started: one thread, and free to decode in a process of its own."""
 
@@ -107,7 +117,7 @@ def client(address: str | None, workers: int) -> Iterator[Client]:
             with _at(address) as remote:
                 yield remote
             return
-        with _deaf():  # to Ctrl-C, for good: it is this process that ends them, without a word of theirs
+        with dask.config.set(_STEADY), _deaf():  # to Ctrl-C: this process ends them, without a word
             own = LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
@@ -116,8 +126,14 @@ def client(address: str | None, workers: int) -> Iterator[Client]:
                 silence_logs=50,
             )
             here = Client(own)
-            here.wait_for_workers(workers)
         with own, here:
+            try:
+                here.wait_for_workers(1, timeout=START_PATIENCE)  # the others join when they are there
+            except TimeoutError:
+                raise GliderwatchError(
+                    f"no worker process came up within {START_PATIENCE}: is there memory left? With "
+                    "--workers 1 it takes least"
+                ) from None
             yield here
 
 

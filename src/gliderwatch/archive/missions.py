@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain, count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -74,7 +75,7 @@ def is_full(path: Path) -> bool:
 
 def _unlike(name: str, others: Iterable[Mission]) -> str:
     used = {one.name for one in others}
-    return next(n for n in (name, *(f"{name}-{i}" for i in range(2, 10**6))) if n not in used)
+    return next(n for n in chain([name], (f"{name}-{i}" for i in count(2))) if n not in used)
 
 
 @contextmanager
