@@ -183,4 +183,9 @@ def test_the_summary_is_a_table_and_a_page(made: tuple[Path, Mission, Hindcast],
     table = pq.read_table(tmp_path / summary.TABLE).to_pylist()
     assert [row["files"] for row in table] == ["as sent", "full"]
     assert table[0]["dives"] == table[0]["judged"] + made[2].online.flags.get("none", 0)
-    assert "sim-2024/report.html" in (tmp_path / summary.PAGE).read_text()
+    assert [row["with_step"] for row in table] == [None, len(made[2].full.incidents)]
+    assert all(0.0 < row["seen_after"] < 12.0 for row in table)
+    assert table[1]["depth"] > 20.0
+    page = (tmp_path / summary.PAGE).read_text()
+    assert "sim-2024/report.html" in page
+    assert "By files as sent, 1 mission, 0.0" in page

@@ -62,8 +62,21 @@ class Judged:
 
 
 @dataclass(frozen=True, slots=True)
+class Sea:
+    """Where a mission flew: mean place (degrees), median of the greatest ``depth`` of its dives (m), root
+    mean square of the ``tide`` and of the ``residual`` in delayed mode (m/s); None where it is not known."""
+
+    lat: float | None
+    lon: float | None
+    depth: float | None
+    tide: float | None
+    residual: float | None
+
+
+@dataclass(frozen=True, slots=True)
 class Hindcast:
-    """What came of a mission: by files as sent (``online``), by full ones (``full``), their ``difference``.
+    """What came of a mission: by files as sent (``online``), by full ones (``full``), their ``difference``,
+    its ``sea``.
 
     ``near_real_time`` and ``delayed`` are medians of the standard error of the instantaneous current (m/s).
     """
@@ -74,6 +87,7 @@ class Hindcast:
     online: Judged | None
     full: Judged | None
     difference: Difference | None
+    sea: Sea
     near_real_time: float | None
     delayed: float | None
 
@@ -220,11 +234,31 @@ def hindcast(mission: Mission, made: Replays) -> tuple[Hindcast, Evidence]:
         None if made.online is None else made.online.judged,
         None if made.full is None else made.full.judged,
         None if made.full is None or made.online is None else _difference(made.full, made.online),
+        _sea(best.assessments, delayed),
         None if delayed is None else float(np.median(delayed.near_real_time.sigma)),
         None if delayed is None else float(np.median(delayed.delayed.sigma)),
     )
     full = made.full if best is made.full else None
     return found, Evidence(made.online, full, delayed, tuple(measured), made.width, made.spells)
+
+
+def _sea(dives: Sequence[Assessment], delayed: Delayed | None) -> Sea:
+    places = np.array([(d.lat, d.lon) for d in dives if d.lat is not None and d.lon is not None])
+    depths = [d.evidence["depth_max"] for d in dives if "depth_max" in d.evidence]
+    currents = None if delayed is None else delayed.delayed
+    lat, lon = map(float, places.mean(axis=0)) if len(places) else (None, None)
+    return Sea(
+        lat,
+        lon,
+        float(np.median(depths)) if depths else None,
+        None if currents is None else _size(currents.tide),
+        None if currents is None else _size(currents.residual),
+    )
+
+
+def _size(flow: Array) -> float:
+    """Root mean square of the speed of a flow ((n, 2), m/s)."""
+    return float(np.sqrt(np.mean(np.sum(flow**2, axis=1))))
 
 
 def _difference(full: Replayed, online: Replayed) -> Difference:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from textwrap import wrap
+from typing import Any
 
 import msgspec
 from jinja2 import PackageLoader, Template
@@ -24,6 +26,8 @@ from gliderwatch.messages.template import environment
 from gliderwatch.model import Kind
 from gliderwatch.service.replay_files import find_files
 
+LINES = 36
+"""Lines of text on a page of paper."""
 RESULT, PAGE, PAPER, NUMBERS = "hindcast.json", "report.html", "report.pdf", "figures.nc"
 
 
@@ -71,7 +75,7 @@ def write(out: Path, found: Hindcast, evidence: Evidence) -> None:
     (out / PAGE).write_text(page, encoding="utf-8")
     for name, _, figure in maps:
         figure.suptitle(name, x=0.02, ha="left", fontsize=10, fontweight="bold")
-    paper = [_cover(found), *(figure for *_, figure in maps), *map(plots.page_figure, made)]
+    paper = [*_cover(found), *(figure for *_, figure in maps), *map(plots.page_figure, made)]
     plots.write_pdf(out / PAPER, f"{found.name}: hindcast", paper)
     drawing.write_numbers(out / NUMBERS, evidence, made)
     assessments = evidence.best.assessments
@@ -135,7 +139,8 @@ def delay(one: Delay) -> str:
         already = "" if one.already is None else f"; they had one open since {utc(one.already)}"
         return f"{name} since {utc(one.full.since)}: not by files as sent{already}"
     assert one.later is not None
-    late = f"{one.later:+.1f} h later" if abs(one.later) > 0.05 else "at the same surfacing"
+    late = f"{abs(one.later):.1f} h {'later' if one.later > 0 else 'earlier'}"
+    late = late if abs(one.later) > 0.05 else "at the same surfacing"
     began = "it began" if one.full.onset is not None else "the dive began in which it is first seen"
     return (
         f"{name} since {utc(one.full.since)}: by files as sent {late}; known on shore "
@@ -152,11 +157,15 @@ def _cm(value: float | None) -> str:
     return "unknown" if value is None else f"{100 * value:.1f} cm/s"
 
 
-def _cover(found: Hindcast) -> object:
-    figure = plots.library().figure.Figure(figsize=(8.3, 5.8))
-    figure.text(0.06, 0.92, found.name, fontsize=16, fontweight="bold", va="top")
-    figure.text(0.06, 0.84, "\n".join(lines(found)), fontsize=7.5, va="top", family="monospace", wrap=True)
-    return figure
+def _cover(found: Hindcast) -> list[Any]:
+    """What was found, as pages of text."""
+    text = [part for line in lines(found) for part in wrap(line, 112, subsequent_indent="      ")]
+    pages = [text[i : i + LINES] for i in range(0, len(text), LINES)]
+    figures = [plots.library().figure.Figure(figsize=(8.3, 5.8)) for _ in pages]
+    for figure, page in zip(figures, pages, strict=True):
+        figure.text(0.06, 0.94, found.name, fontsize=16, fontweight="bold", va="top")
+        figure.text(0.06, 0.86, "\n".join(page), fontsize=7.5, va="top", family="monospace")
+    return figures
 
 
 @cache

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import pyarrow as pa
@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 from jinja2 import PackageLoader
 
 from gliderwatch import __version__
-from gliderwatch.archive.hindcast import Hindcast, Judged
+from gliderwatch.archive.hindcast import Hindcast, Judged, Sea
 from gliderwatch.messages.formatting import utc
 from gliderwatch.messages.template import environment
 
@@ -34,16 +34,29 @@ _SCHEMA = pa.schema(
         ("current", pa.float64()),
         ("anomalies", pa.int32()),
         ("false_alarms", pa.int32()),
+        ("with_step", pa.int32()),
+        ("first_seen", pa.timestamp("s", tz="UTC")),
+        ("seen_after", pa.float64()),
+        ("lat", pa.float64()),
+        ("lon", pa.float64()),
+        ("depth", pa.float64()),
+        ("tide", pa.float64()),
+        ("residual", pa.float64()),
         ("near_real_time_sigma", pa.float64()),
         ("delayed_sigma", pa.float64()),
     ],
-    metadata={"units": "speeds and currents in m/s, months of 30 days"},
+    metadata={"units": "speeds and currents in m/s, months of 30 days, seen_after in h, depth in m"},
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A mission by one kind of its files."""
+    """A mission by one kind of its files.
+
+    ``with_step`` counts the anomalies at which depth rate, pitch or roll show a step (full files only),
+    ``first_seen`` (s) is the surfacing at which the first incident was opened, ``seen_after`` (h) see
+    `_seen_after`.
+    """
 
     name: str
     glider: str
@@ -51,6 +64,10 @@ class Row:
     judged: Judged
     anomalies: int
     false_alarms: int
+    with_step: int | None
+    first_seen: float | None
+    seen_after: float | None
+    sea: Sea
 
 
 def rows(found: Sequence[Hindcast]) -> list[Row]:
@@ -59,9 +76,63 @@ def rows(found: Sequence[Hindcast]) -> list[Row]:
     for one in sorted(found, key=lambda h: h.name):
         for files, judged in (("as sent", one.online), ("full", one.full)):
             if judged is not None:
-                kinds = [incident.kind for incident in judged.incidents]
-                opened = kinds.count("anomaly"), kinds.count("false_alarm")
-                out.append(Row(one.name, one.glider, files, judged, *opened))
+                out.append(_row(one, files, judged))
+    return out
+
+
+def _row(one: Hindcast, files: str, judged: Judged) -> Row:
+    kinds = [incident.kind for incident in judged.incidents]
+    anomalies = [incident for incident in judged.incidents if incident.kind == "anomaly"]
+    steps = sum(incident.onset is not None for incident in anomalies) if files == "full" else None
+    seen = min((incident.opened_at for incident in judged.incidents), default=None)
+    return Row(
+        one.name,
+        one.glider,
+        files,
+        judged,
+        len(anomalies),
+        kinds.count("false_alarm"),
+        steps,
+        seen,
+        _seen_after(one, files),
+        one.sea,
+    )
+
+
+def _seen_after(one: Hindcast, files: str) -> float | None:
+    """How long (h) after its onset within a dive the first such incident was seen: by full files at the
+    surfacing, by files as sent on shore; None where no onset is known."""
+    for incident in () if one.full is None else one.full.incidents:
+        if incident.onset is not None and files == "full":
+            return (incident.opened_at - incident.onset.t) / 3600
+    for delay in () if one.difference is None else one.difference.delays:
+        if delay.full.onset is not None and files != "full":
+            return delay.after
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class Total:
+    """All missions by one kind of their files: how many ``missions`` and ``months``, and what was found."""
+
+    files: str
+    missions: int
+    months: float
+    anomalies: int
+    false_alarms: int
+    with_step: int | None
+
+
+def totals(some: Sequence[Row]) -> list[Total]:
+    """The sums of the rows of each kind of files."""
+    out = []
+    for files in ("as sent", "full"):
+        of = [row for row in some if row.files == files]
+        steps = sum(row.with_step or 0 for row in of) if files == "full" else None
+        if of:
+            months = sum(row.judged.months for row in of)
+            found = sum(row.anomalies for row in of), sum(row.false_alarms for row in of)
+            out.append(Total(files, len(of), months, *found, steps))
     return out
 
 
@@ -84,20 +155,21 @@ def write(out: Path, found: Sequence[Hindcast]) -> None:
             "current": row.judged.current,
             "anomalies": row.anomalies,
             "false_alarms": row.false_alarms,
+            "with_step": row.with_step,
+            "first_seen": None if row.first_seen is None else round(row.first_seen),
+            "seen_after": row.seen_after,
+            **asdict(row.sea),
             "near_real_time_sigma": by_name[row.name].near_real_time,
             "delayed_sigma": by_name[row.name].delayed,
         }
         for row in made
     ]
     pq.write_table(pa.Table.from_pylist(table, schema=_SCHEMA), out / TABLE)
-    months = sum(row.judged.months for row in made)
     pages = environment(PackageLoader("gliderwatch.archive"))
     pages.filters["utc"] = utc
     page = pages.get_template("summary.html").render(
         rows=made,
-        months=months,
-        anomalies=sum(row.anomalies for row in made),
-        false_alarms=sum(row.false_alarms for row in made),
+        totals=totals(made),
         version=__version__,
     )
     (out / PAGE).write_text(page, encoding="utf-8")
