@@ -17,6 +17,7 @@ import os
 import shutil
 import sys
 import tempfile
+from collections.abc import Iterator
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,6 +44,7 @@ TESTS = {
     "forecast": "unit/test_heuristics_forecast unit/test_kalman_expected_flow unit/test_forecast_steering"
     " unit/test_forecast_surfacing unit/test_forecast_timing unit/test_forecast_waypoints"
     " property/test_forecast",
+    "messages": "unit/test_heuristics_messages unit/test_evidence unit/test_incident_text",
     "health": "unit/test_heuristics_health unit/test_health_rules unit/test_health_incidents",
     "incidents": "unit/test_heuristics_incidents unit/test_notifications unit/test_state_machine"
     " unit/test_overdue unit/test_unjudged unit/test_send_schedule",
@@ -64,23 +66,34 @@ class Change:
 def constants(room: str) -> list[tuple[str, str]]:
     """Name and text of the value of each constant on a room's page; sets of names are none."""
     page = ast.parse((PACKAGE / room / "constants.py").read_text(encoding="utf-8"))
-    return [
-        (node.targets[0].id, ast.unparse(node.value))
-        for node in page.body
-        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
-        if not isinstance(node.value, ast.Call)
-    ]
+    return [(name, ast.unparse(value)) for name, value in assigned(page)]
+
+
+def assigned(page: ast.Module) -> Iterator[tuple[str, ast.expr]]:
+    """Each name of a page with its value; some that belong together stand on one line."""
+    for node in page.body:
+        if not isinstance(node, ast.Assign) or isinstance(node.value, ast.Call):
+            continue
+        target, value = node.targets[0], node.value
+        if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+            pairs = zip(target.elts, value.elts, strict=True)
+            yield from ((name.id, each) for name, each in pairs if isinstance(name, ast.Name))
+        elif isinstance(target, ast.Name):
+            yield target.id, value
 
 
 def changed(value: str, how: str) -> str:
     """The text of a value that is halved or doubled; a whole number stays one and is at least 1."""
-    now = eval(value, {"__builtins__": {}}, dict(_values()))
-    factor = CHANGES[how]
+    return repr(_times(CHANGES[how], eval(value, {"__builtins__": {}}, dict(_values()))))
+
+
+def _times(factor: float, now: object) -> object:
     if isinstance(now, tuple):
-        return repr(tuple(factor * x for x in now))
+        return tuple(_times(factor, each) for each in now)
     if isinstance(now, dict):
-        return repr({key: factor * x for key, x in now.items()})
-    return repr(max(int(now * factor), 1) if isinstance(now, int) else factor * now)
+        return {key: _times(factor, each) for key, each in now.items()}
+    assert isinstance(now, int | float)
+    return max(int(now * factor), 1) if isinstance(now, int) else factor * now
 
 
 def _values() -> dict[str, object]:
@@ -107,6 +120,15 @@ def tests(change: Change) -> list[str]:
     return sorted(map(str, files), key=lambda path: not any(user in texts[Path(path)] for user in users))
 
 
+def replaced(text: str, value: ast.expr, by: str) -> str:
+    """A page with one of its values replaced."""
+    assert value.end_lineno is not None and value.end_col_offset is not None
+    lines = [line.encode() for line in text.splitlines(keepends=True)]  # columns are counted in bytes
+    first, last = lines[value.lineno - 1], lines[value.end_lineno - 1]
+    there = first[: value.col_offset] + by.encode() + last[value.end_col_offset :]
+    return b"".join([*lines[: value.lineno - 1], there, *lines[value.end_lineno :]]).decode()
+
+
 class FirstFailure:
     """Remembers the first test that failed."""
 
@@ -129,15 +151,10 @@ def first_failure(change: Change) -> str:
         if change.how != "none":
             page = copy / change.room / "constants.py"
             text = page.read_text(encoding="utf-8")
-            before = next(
-                ast.get_source_segment(text, node)
-                for node in ast.parse(text).body
-                if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == change.name
-            )
-            assert before is not None
-            after = f"{change.name} = {changed(change.value, change.how)}"
-            assert f"\n{before}\n" in text and after != before, f"{change.name} can not be changed"
-            page.write_text(text.replace(f"\n{before}\n", f"\n{after}\n", 1), encoding="utf-8")
+            before = dict(assigned(ast.parse(text)))[change.name]
+            after = changed(change.value, change.how)
+            assert after != ast.unparse(before), f"{change.name} can not be changed"
+            page.write_text(replaced(text, before, after), encoding="utf-8")
         sys.path.insert(0, folder)
         os.chdir(ROOT)
         seen = FirstFailure()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from gliderwatch.model import Series, readonly
-from gliderwatch.navigation.fixes import LEAST, new_fixes, zeroed
+from gliderwatch.navigation.constants import ZERO_LEAST
+from gliderwatch.navigation.fixes import new_fixes, zeroed
 from gliderwatch.navigation.flight import prepare
 from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
@@ -82,4 +83,4 @@ def test_a_segment_without_a_fix_has_the_offset_of_the_one_before():
     s = segment("unit-2023-318-0-1", 0.0, {"depth": [(float(t), 5.0) for t in range(0, 600, 30)]})
     samples, known = zeroed(prepare(s, 0.0), [], 5.0)
     assert known == 5.0
-    assert np.abs(samples["depth"].v).max() < LEAST
+    assert np.abs(samples["depth"].v).max() < ZERO_LEAST

@@ -59,6 +59,12 @@ INHG = 3386.389
 """Pascal in an inch of mercury."""
 TREND_WINDOWS = (2.5 * DAY, 5 * DAY, 10 * DAY)
 """Seconds over which the trend of the vacuum is fitted: a leak that began lately shows in the shortest."""
+TREND_COVERED = 0.6
+"""Part of such a window that the readings have to reach over."""
+MOST_CORRELATION = 0.9
+"""Correlation of readings that follow each other, at most: more would leave no independent ones."""
+HUBER = 3.0
+"""Standard deviations from a line beyond which a reading is drawn in (Huber 1964)."""
 TREND_FILES = 10
 """Least files for a trend."""
 TREND_SIGMA = 3.0

@@ -12,9 +12,12 @@ from gliderwatch.health.constants import (
     CLEAR_TREND_AFTER,
     COOL,
     DAY,
+    HUBER,
     INHG,
+    MOST_CORRELATION,
     OFF_LINE,
     ROBUST,
+    TREND_COVERED,
     TREND_FILES,
     TREND_LEAST,
     TREND_SIGMA,
@@ -84,7 +87,7 @@ def _slow_leak(history: History, limits: Limits) -> Finding | None:
         vacuum = Series(series.t, readonly(ATMOSPHERE - series.v * COOL))  # as if always at one temperature
         for window in TREND_WINDOWS:
             part = vacuum.between(float(vacuum.t[-1]) - window, np.inf)
-            if len(part) <= TREND_FILES or part.t[-1] - part.t[0] < 0.6 * window:
+            if len(part) <= TREND_FILES or part.t[-1] - part.t[0] < TREND_COVERED * window:
                 continue
             slope, sigma, sure = trend(part.t, part.v)
             fewer = (trend(part.t[:n], part.v[:n]) for n in (len(part) - 1, len(part) - 2))
@@ -102,7 +105,7 @@ def trend(t: Array, v: Array) -> tuple[float, float, float]:
     """Slope of a line through values ``v`` at times ``t`` (s), its standard error (units a second), and of
     how many of these it has to be to be as sure as `TREND_SIGMA` of a normal one, looked for in all windows.
 
-    Least squares after what is wild is drawn in (Huber, three standard deviations); the error is that of
+    Least squares after what is wild is drawn in (Huber); the error is that of
     residuals that follow each other: with their correlation r there are as many independent values as
     n (1 - r) / (1 + r), and Student's t of those.
     """
@@ -117,10 +120,11 @@ def trend(t: Array, v: Array) -> tuple[float, float, float]:
         slope = float((weights * (x - mean_x) * (v - mean_v)).sum()) / spread_x
         rest = v - mean_v - slope * (x - mean_x)
         scale = max(ROBUST * float(np.median(np.abs(rest))), OFF_LINE / 10)
-        weights = np.minimum(1.0, 3.0 * scale / np.maximum(np.abs(rest), 1e-9))
+        weights = np.minimum(1.0, HUBER * scale / np.maximum(np.abs(rest), 1e-9))
     variance = max(float(np.sum(weights * rest**2)) / (len(v) - 2), (OFF_LINE / 5) ** 2)
     r = float(np.sum(rest[1:] * rest[:-1]) / max(float(np.sum(rest**2)), 1e-12))
-    r = min(max(r + 1 / len(v), 0.0), 0.9)  # that of residuals of a line is too low by about 1 / n
+    # that of residuals of a line is too low by about 1 / n
+    r = min(max(r + 1 / len(v), 0.0), MOST_CORRELATION)
     independent = len(v) * (1 - r) / (1 + r)
     chance = float(ndtr(-TREND_SIGMA)) / len(TREND_WINDOWS)
     surely = -float(stdtrit(max(independent - 2, 1.0), chance))

@@ -12,15 +12,12 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from gliderwatch.incidents.acknowledgement import Acks, is_acknowledged
+from gliderwatch.incidents.constants import NEWS, SAME_ABORT
 from gliderwatch.incidents.notices import Aborted, AbortReport, Notice, Resumed, StillAborted
 from gliderwatch.incidents.send_schedule import is_reminder_due
 from gliderwatch.incidents.threads import thread_id
 from gliderwatch.model import Aborts, Call, Happened, Happening, Kind, Severity
 
-SAME = 1800.0
-"""Seconds: two lines about an abort that are no further apart are about the same one."""
-NEWS = 86400.0
-"""Seconds: what was reported in a call that was over for longer when its log came is history, not news."""
 LAST_MISSIONS = ("lastgasp.mi", "initial.mi")
 _SEVERITIES = {
     Happening.ABORTING: Severity.CRITICAL,
@@ -107,7 +104,7 @@ def _of_happened(happened: Happened) -> AbortReport:
 
 
 def _is_same(one: AbortReport, other: AbortReport) -> bool:
-    return one.what == other.what and abs(one.t - other.t) <= SAME
+    return one.what == other.what and abs(one.t - other.t) <= SAME_ABORT
 
 
 def announce(

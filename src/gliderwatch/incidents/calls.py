@@ -6,16 +6,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from gliderwatch.incidents.aborts import NEWS
 from gliderwatch.incidents.acknowledgement import Acks, is_acknowledged
-from gliderwatch.incidents.constants import LONGEST_CALL
+from gliderwatch.incidents.constants import EMPTY_CALLS, LONGEST_CALL, NEWS, SAME_SURFACING
 from gliderwatch.incidents.notices import CalledWithoutFile, Notice, SendsAgain
 from gliderwatch.incidents.overdue import HOUR, Sign
 from gliderwatch.incidents.threads import thread_id
 from gliderwatch.model import Call, Kind, Severity
 
-SEVERAL = 2
-"""Calls without a file in a row that are a warning; one alone may be a dropped connection."""
 _PLACE = 1e-5
 """Degrees by which two fixes may differ that are the same one, printed twice."""
 
@@ -50,7 +47,7 @@ def surfacings(calls: Iterable[Call]) -> tuple[Surfacing, ...]:
 
 def _is_one(before: list[Call], call: Call) -> bool:
     pause = call.began - max(c.last_t for c in before)
-    if pause > 6 * HOUR:
+    if pause > SAME_SURFACING:
         return False
     fix = next((c.fix for c in reversed(before) if c.fix is not None), None)
     if fix is None or call.fix is None:
@@ -111,10 +108,10 @@ def announce(
     if state is None or state.is_over:
         used = [] if state is None else [state.id]
         state = CallsWithoutFile(thread_id(f"{glider}/call/{since:.0f}", used), since, 0, 0)
-    is_due = n > state.reported and (n <= SEVERAL or n >= 2 * state.reported)
+    is_due = n > state.reported and (n <= EMPTY_CALLS or n >= 2 * state.reported)
     if not is_due or now - run[-1][-1].last_t >= NEWS:
         return before, []
-    loud = Severity.INFO if n < SEVERAL else Severity.WARNING
+    loud = Severity.INFO if n < EMPTY_CALLS else Severity.WARNING
     if is_acknowledged(acks, (state.id,), loud):
         return before, []
     content = CalledWithoutFile(tuple(group[-1] for group in run))
@@ -131,7 +128,7 @@ def _over(
     if before is None or before.is_over or not later:
         return before, []
     ended = replace(before, is_over=True)
-    if before.reported < SEVERAL:
+    if before.reported < EMPTY_CALLS:
         return ended, []
     identity, call = f"{before.id}/{before.messages}", later[-1][-1]
     info, to = Severity.INFO, Severity.WARNING

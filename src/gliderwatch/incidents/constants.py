@@ -101,3 +101,22 @@ SLACK = 0.2
 
 UNTIL_COME = 3600.0
 """Seconds after a call after which a file that was announced in it has come, or does not."""
+
+# What a glider reports in its calls
+SAME_ABORT = 1800.0
+"""Seconds: two lines about an abort that are no further apart are about the same one."""
+
+EMPTY_CALLS = 2
+"""Calls without a file in a row that are a warning; one alone may be a dropped connection."""
+SAME_SURFACING = 6 * 3600.0
+"""s between two calls, above which they are never of one surfacing."""
+
+# Files that are wrong although the flight may be right
+STEP_REPORTED = 3 * 3600.0
+"""Seconds: a clock that was set by less is named in the notes of the dives alone."""
+PLACES = 12
+"""Surfacings among which two gliders of one name are looked for."""
+ALTERNATIONS = 3
+"""Times that a glider is elsewhere and back again: once and twice may be a wild position."""
+FAR_APART = 5000.0
+"""Metres: two places nearer than this may be of one glider, however close in time."""

@@ -9,21 +9,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from gliderwatch.incidents.constants import FRESH, GONE
+from gliderwatch.incidents.constants import ALTERNATIONS, FAR_APART, FRESH, GONE, STEP_REPORTED
 from gliderwatch.incidents.notices import Irregularity, Notice, OldDates, TwoGliders
 from gliderwatch.model import Fix, Kind, Severity
-from gliderwatch.navigation.clock import DAY, HOUR, ClockStep, numbered
+from gliderwatch.navigation.clock import DAY, ClockStep, numbered
 from gliderwatch.navigation.constants import FASTEST_OVER_GROUND
 from gliderwatch.navigation.fixes import distance
-
-LEAST_STEP = 3 * HOUR
-"""Seconds: a clock that was set by less is named in the notes of the dives alone."""
-PLACES = 12
-"""Surfacings among which two gliders of one name are looked for."""
-ALTERNATIONS = 3
-"""Times that a glider is elsewhere and back again: once and twice may be a wild position."""
-FAR = 5000.0
-"""Metres: two places nearer than this may be of one glider, however close in time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +33,7 @@ def irregularities(
 ) -> list[Irregularity]:
     """What is wrong with the files of a glider: ``steps`` of its clock, its last ``places`` in order, and the
     segments that came in the last 30 days."""
-    out = [_clock(step) for step in steps if abs(step.step) >= LEAST_STEP]
+    out = [_clock(step) for step in steps if abs(step.step) >= STEP_REPORTED]
     out += _old_dates(glider, arrivals, {numbered(step.segment)[0] for step in steps})
     other = _two_gliders(glider, places)
     return out if other is None else [*out, other]
@@ -111,4 +102,4 @@ def _two_gliders(glider: str, places: Sequence[Fix]) -> Irregularity | None:
 
 def _is_too_far(a: Fix, b: Fix) -> bool:
     way = distance(a, b)
-    return way > FAR and way > FASTEST_OVER_GROUND * abs(b.t - a.t)
+    return way > FAR_APART and way > FASTEST_OVER_GROUND * abs(b.t - a.t)

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from gliderwatch.incidents.acknowledgement import Acks, is_acknowledged
-from gliderwatch.incidents.calls import SEVERAL
+from gliderwatch.incidents.constants import EMPTY_CALLS
 from gliderwatch.incidents.notifications import (
     NotificationState,
     Thread,
@@ -71,7 +71,7 @@ def open_threads(notified: NotificationState) -> tuple[OpenThread, ...]:
     )
     empty, found = notified.empty, list[OpenThread]()
     if empty is not None and not empty.is_over:
-        severity = Severity.INFO if empty.reported < SEVERAL else Severity.WARNING
+        severity = Severity.INFO if empty.reported < EMPTY_CALLS else Severity.WARNING
         found = [OpenThread(empty.id, Kind.CALL, severity, empty.since, f"{empty.reported} without a file")]
     return (*aborts, *found, *health)
 

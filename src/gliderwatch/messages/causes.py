@@ -9,11 +9,9 @@ from gliderwatch.estimation.modes import MODES
 from gliderwatch.estimation.modes import Cause as Explanation
 from gliderwatch.estimation.verdict import FASTER, NEW_FASTER, Blame
 from gliderwatch.messages.baseline import BaselineRemark, usual
+from gliderwatch.messages.constants import HIDDEN, ROLL_OF_ANY
 from gliderwatch.messages.formatting import angle, finite, speed
 from gliderwatch.model import Assessment, Kind
-
-ROLL_OF_ANY = 15.0  # degrees: unusual on any glider, for one whose usual roll is not known
-HIDDEN = 0.1  # part of the speed that the glider believes, by which it is slower than that
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import hypot
+from math import hypot, radians
 from statistics import NormalDist
 from typing import NamedTuple
 
+from gliderwatch.fleet.constants import DAC_NOISE, USUAL_SLIP
 from gliderwatch.messages.baseline import has_usual, usual
-from gliderwatch.messages.causes import ROLL_OF_ANY, WING, Cause
+from gliderwatch.messages.causes import WING, Cause
+from gliderwatch.messages.constants import (
+    CERTAIN,
+    DRIFT,
+    FIX_GAP,
+    LEARNT,
+    MISFIT,
+    RATE_RATIO,
+    ROLL_OF_ANY,
+    SHORT_DIVE,
+    STEADY,
+    SURE,
+    UNOBSERVED,
+)
 from gliderwatch.messages.formatting import angle, clean, finite, speed
 from gliderwatch.model import Assessment, Kind
 
 # Bounds above (or below) which a number is worth a line; they change no flag.
-MISFIT = 0.05  # m/s across the heading; a few mm/s to 2 cm/s when fixes, compass and current agree
-RATE_RATIO = 1.5  # between descent and climb
-STEADY = 0.98  # length of the mean heading vector
-SHORT_DIVE = 1.0  # h
-DRIFT = 0.5  # h
-FIX_GAP = 15.0  # min
-UNOBSERVED = 0.1  # h
-SURE = 4.0  # standard errors beyond which a misfit is one
-STRONG, MINOR = 3.0, 0.5  # weights of what decides, and of what is good to know; others: 1
+STRONG, MINOR = 3.0, 0.5  # what decides comes first, what is good to know last; others have 1
 LINES = 3  # on each side, for a phone
-USUAL_SLIP = 0.08  # part of the speed that a glider reckons with, which the angle of attack takes
-DAC_ERROR = 0.02  # m/s: error of a depth-averaged current, a component
 TWO_SIGMA = 2.45  # standard errors that hold 95 % of two components
-LEARNT = 1.6  # times the usual speed: a bound above it was not learnt from dives
-CERTAIN = 0.99  # more than that is never claimed: what is modelled is not all
 _WORDS = ((0.975, "almost sure"), (0.9, "very likely"), (0.75, "likely"), (0.0, "not sure"))
 
 
@@ -160,7 +162,7 @@ def _of_any(a: Assessment, cause: Cause) -> list[Remark]:
     found = []
     roll = number(a, "roll_mean")
     if roll is not None and not has_usual(a.evidence, "roll_mean") and "roll_mean" in cause.off:
-        is_large = abs(roll) > ROLL_OF_ANY / 57.3
+        is_large = abs(roll) > radians(ROLL_OF_ANY)
         found.append(Remark(is_large, f"mean roll {angle(roll)}", STRONG if is_large else 1.0))
     down, up = number(a, "depth_rate_dive"), number(a, "depth_rate_climb")
     if down and up and not has_usual(a.evidence, "rate_ratio"):
@@ -186,7 +188,7 @@ def _disagreement(a: Assessment) -> list[Remark]:
         agree = p_e <= a.gamma_f
         text = f"the current estimated here and that of the glider are {speed(apart)} apart"
         if agree:  # p_E is less than the limit beside strong currents, whatever the errors are
-            small = apart <= TWO_SIGMA * hypot(number(a, "flow_sigma") or 0.0, DAC_ERROR)
+            small = apart <= TWO_SIGMA * hypot(number(a, "flow_sigma") or 0.0, DAC_NOISE)
             text += ", within their errors" if small else ", which is little beside the currents met so far"
         found.append(Remark(not agree, text, MINOR if agree else 2.0))
     onboard = through_water(number(a, "onboard_speed"))

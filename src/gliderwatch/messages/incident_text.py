@@ -22,6 +22,7 @@ from gliderwatch.incidents.notices import (
 )
 from gliderwatch.layers.advice import LayerAdvice
 from gliderwatch.messages.causes import Likely, likeliest
+from gliderwatch.messages.constants import SLOWER
 from gliderwatch.messages.evidence import (
     certainty,
     data_quality,
@@ -46,9 +47,6 @@ from gliderwatch.messages.phrases import (
 )
 from gliderwatch.messages.template import Page, Text, command, titled
 from gliderwatch.model import Assessment, Flag, Incident, Kind
-
-SLOWER = 0.01
-"""m/s: speeds that differ by less are as bad as each other."""
 
 
 def opened(glider: str, content: Opened) -> Text:

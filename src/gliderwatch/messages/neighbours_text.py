@@ -9,7 +9,7 @@ from gliderwatch.fleet.cross_check import Hypothesis
 from gliderwatch.fleet.flow import Fault
 from gliderwatch.fleet.reference import FleetReference
 from gliderwatch.incidents.notices import DiffersFromNeighbours
-from gliderwatch.messages.evidence import CERTAIN
+from gliderwatch.messages.constants import CERTAIN
 from gliderwatch.messages.formatting import clean, flow, utc
 from gliderwatch.messages.phrases import map_of, mute_link, name_of, next_call, where
 from gliderwatch.messages.template import Page, Text, titled

@@ -6,6 +6,7 @@ The same form as `messages.incident_text`: what, since when, how sure; where to 
 from __future__ import annotations
 
 from gliderwatch.incidents.notices import Absence, CalledAgain, CalledInTime, DriftEllipse, Fleet, Overdue
+from gliderwatch.messages.constants import ROUND
 from gliderwatch.messages.formatting import (
     INCIDENTS,
     UNKNOWN,
@@ -22,8 +23,6 @@ from gliderwatch.model import Assessment
 
 _EACH = "This stands for all of them: each that still stays away when one calls gets a message of its own."
 _NO_CALL = "Next call: not known any more; the first sign of life is reported at once."
-_ROUND = 0.9
-"""Ratio of the semi-axes from which an ellipse is called a circle."""
 
 
 def overdue(glider: str, content: Overdue) -> Text:
@@ -110,7 +109,7 @@ def _search(a: Absence) -> str:
 
 
 def _size(area: DriftEllipse) -> str:
-    if area.minor >= _ROUND * area.major:
+    if area.minor >= ROUND * area.major:
         return f"95 % within {area.major / 1000:.1f} km"
     axes = f"95 % within {area.major / 1000:.1f} x {area.minor / 1000:.1f} km"
     return f"{axes}, the longer towards {round(area.bearing) % 180:03d}°"

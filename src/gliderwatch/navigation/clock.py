@@ -13,31 +13,23 @@ from dataclasses import dataclass, replace
 from math import ceil
 
 from gliderwatch.model import Fix, Segment, SegmentId, Series, readonly
-from gliderwatch.navigation.constants import FASTEST_OVER_GROUND
+from gliderwatch.navigation.constants import (
+    ENOUGH_SEGMENTS,
+    FASTEST_OVER_GROUND,
+    LEAST_STEP,
+    LONGEST_CALL,
+    LONGEST_PAUSE,
+    OVERLAP,
+    PAUSE,
+    SAME_OPENING,
+    SILENT_AT_MOST,
+    WILD_SEGMENT,
+)
 from gliderwatch.navigation.fixes import distance
 
 HOUR, DAY = 3600.0, 86400.0
 ROLLOVER = 1024 * 7 * DAY
 """Seconds after which the week number of GPS begins again at 0; an old receiver falls back by it."""
-OVERLAP = 60.0
-"""Seconds by which a segment may end after the next has opened: the time stamps of the last cycles."""
-PAUSE = 60.0
-"""Seconds from the end of a segment to the opening of the next, where the step is not in whole hours."""
-LONGEST_PAUSE = 900.0
-"""Seconds: a step in whole hours leaves no longer pause than this between two segments (real ones: 810)."""
-LONGEST_CALL = 3600.0
-"""Seconds of the same for a step in whole days, which is seldom met by chance."""
-LEAST_STEP = HOUR
-"""Seconds: a clock that was set forward by less looks like a long call."""
-SILENT_AT_MOST = 60 * DAY
-"""Seconds without a segment over which a step of `ROLLOVER` is still known for one."""
-ENOUGH = 4
-"""Segments of a mission that say how long one may be."""
-WILD = 2.0
-"""Times the second longest segment beyond which the end of the longest is a wild time stamp."""
-SAME_OPENING = 120.0
-"""Seconds: two files of one name that open further apart are of two segments. The sbd, mbd and dbd of one
-segment open within seconds; a mission counter begins again at 0 after a restart of the glider."""
 _NUMBERED = re.compile(r"(?P<mission>.+-\d{4}-\d{1,3}-\d{1,5})-(?P<number>\d{1,5})", re.ASCII)
 
 
@@ -132,7 +124,7 @@ class MissionClock:
 def mission_clock(stamps: Sequence[Stamp], found: Sequence[Correction]) -> MissionClock | None:
     """The clock of a mission from all its segments and their corrections; None where these are too few, or
     where a number is there twice."""
-    if len(stamps) < ENOUGH or len({stamp.number for stamp in stamps}) < len(stamps):
+    if len(stamps) < ENOUGH_SEGMENTS or len({stamp.number for stamp in stamps}) < len(stamps):
         return None
     newest = max(stamps, key=lambda stamp: stamp.number)
     offset = found[stamps.index(newest)].offset
@@ -142,9 +134,9 @@ def mission_clock(stamps: Sequence[Stamp], found: Sequence[Correction]) -> Missi
 
 def _with_sound_ends(stamps: list[Stamp]) -> list[Stamp]:
     """The segments in order; one that is far longer than all others has a wild time stamp, no known end."""
-    if len(stamps) < ENOUGH:
+    if len(stamps) < ENOUGH_SEGMENTS:
         return stamps
-    longest = WILD * sorted(s.last_t - s.opened_at for s in stamps)[-2]
+    longest = WILD_SEGMENT * sorted(s.last_t - s.opened_at for s in stamps)[-2]
     return [s if s.last_t - s.opened_at <= longest else replace(s, last_t=s.opened_at) for s in stamps]
 
 

@@ -119,3 +119,36 @@ SLOWEST_RECKONED = 0.03
 """m/s between dead-reckoned positions on a flight: slower is no flight."""
 FASTEST_RECKONED = 1.5
 """m/s: faster ones jump to a fix."""
+
+# A clock that is set in mid-mission
+OVERLAP = 60.0
+"""Seconds by which a segment may end after the next has opened: the time stamps of the last cycles."""
+PAUSE = 60.0
+"""Seconds from the end of a segment to the opening of the next, where the step is not in whole hours."""
+LONGEST_PAUSE = 900.0
+"""Seconds: a step in whole hours leaves no longer pause than this between two segments (real ones: 810)."""
+LONGEST_CALL = 3600.0
+"""Seconds of the same for a step in whole days, which is seldom met by chance."""
+LEAST_STEP = 3600.0
+"""Seconds: a clock that was set forward by less looks like a long call."""
+SILENT_AT_MOST = 60 * 86400.0
+"""Seconds without a segment over which a step of `ROLLOVER` is still known for one."""
+ENOUGH_SEGMENTS = 4
+"""Segments of a mission that say how long one may be."""
+WILD_SEGMENT = 2.0
+"""Times the second longest segment beyond which the end of the longest is a wild time stamp."""
+SAME_OPENING = 120.0
+"""Seconds: two files of one name that open further apart are of two segments. The sbd, mbd and dbd of one
+segment open within seconds; a mission counter begins again at 0 after a restart of the glider."""
+
+# A depth sensor that does not show zero at the surface
+ZERO_NEAR = 30.0
+"""Seconds from a fix within which a depth is one at the surface."""
+ZERO_LEAST = 2.0
+"""Metres: less is the pitching in waves, and the depth of a sensor that is below the antenna."""
+ZERO_DEPTHS = 3
+"""Depths at the surface that say what the sensor shows there."""
+ZERO_MOST = 15.0
+"""Metres: a depth beyond this at a fix is that of an old fix, reported once more under water."""
+ZERO_QUANTILE = 0.25
+"""Quantile of the depths at the surface that is taken: some are of the first metres of a dive."""

@@ -12,7 +12,16 @@ from types import MappingProxyType
 import numpy as np
 
 from gliderwatch.model import Fix, Series, readonly
-from gliderwatch.navigation.constants import FASTEST_OVER_GROUND, SURFACE_STAY, SUSPECT_DISTANCE
+from gliderwatch.navigation.constants import (
+    FASTEST_OVER_GROUND,
+    SURFACE_STAY,
+    SUSPECT_DISTANCE,
+    ZERO_DEPTHS,
+    ZERO_LEAST,
+    ZERO_MOST,
+    ZERO_NEAR,
+    ZERO_QUANTILE,
+)
 from gliderwatch.navigation.flight import Samples, get
 
 # ----------------------------------------
@@ -108,17 +117,6 @@ def _may_be_old(last: Fix, fix: Fix) -> bool:
 # ----------------------------------------
 # A depth sensor that does not show zero at the surface: its pressure was not zeroed.
 
-NEAR = 30.0
-"""Seconds from a fix within which a depth is one at the surface."""
-LEAST = 2.0
-"""Metres: less is the pitching in waves, and the depth of a sensor that is below the antenna."""
-FEWEST = 3
-"""Depths at the surface that say what the sensor shows there."""
-MOST = 15.0
-"""Metres: a depth beyond this at a fix is that of an old fix, reported once more under water."""
-SHALLOW = 0.25
-"""Quantile of the depths at the surface that is taken: some are of the first metres of a dive."""
-
 
 def zeroed(fresh: Samples, fixes: list[Fix], before: float) -> tuple[Samples, float]:
     """The samples of a segment with depths from the surface, and what its sensor shows at the surface (m).
@@ -130,7 +128,7 @@ def zeroed(fresh: Samples, fixes: list[Fix], before: float) -> tuple[Samples, fl
         return fresh, before
     shown = _at_surface(depth, [fix.t for fix in fixes])
     if shown is not None:
-        before = shown if abs(shown) > LEAST else 0.0
+        before = shown if abs(shown) > ZERO_LEAST else 0.0
     if not before:
         return fresh, 0.0
     return MappingProxyType({**fresh, "depth": Series(depth.t, readonly(depth.v - before))}), before
@@ -143,12 +141,12 @@ def _at_surface(depth: Series, fixes: list[float]) -> float | None:
     t = np.asarray(fixes)
     at = np.maximum(t.searchsorted(depth.t), 1) - 1
     gap = np.minimum(np.abs(depth.t - t[at]), np.abs(depth.t - t[np.minimum(at + 1, len(t) - 1)]))
-    near = depth.v[gap <= NEAR]
-    if len(near) < FEWEST:
+    near = depth.v[gap <= ZERO_NEAR]
+    if len(near) < ZERO_DEPTHS:
         return None
-    shown = _quantile(near.tolist(), SHALLOW)
+    shown = _quantile(near.tolist(), ZERO_QUANTILE)
     # nobody flies above the surface: a fix at which it is much deeper than elsewhere is an old one
-    return shown if abs(shown) <= MOST and depth.v.min() > shown - LEAST else None
+    return shown if abs(shown) <= ZERO_MOST and depth.v.min() > shown - ZERO_LEAST else None
 
 
 def _quantile(values: list[float], part: float) -> float:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from gliderwatch.incidents.acknowledgement import Ack, Acks
 from gliderwatch.incidents.calls import announced_flight
-from gliderwatch.incidents.constants import FRESH, GONE, UNTIL_COME
-from gliderwatch.incidents.irregularities import PLACES, Arrival, irregularities
+from gliderwatch.incidents.constants import FRESH, GONE, PLACES, UNTIL_COME
+from gliderwatch.incidents.irregularities import Arrival, irregularities
 from gliderwatch.incidents.notices import Irregularity, Unjudged
 from gliderwatch.incidents.overdue import Sign
 from gliderwatch.model import (

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 from gliderwatch.model import NextSurfacing, Segment, SegmentId
 from gliderwatch.navigation.clock import (
-    SAME_OPENING,
     ClockStep,
     Correction,
     MissionClock,
@@ -19,6 +18,7 @@ from gliderwatch.navigation.clock import (
     moved,
     numbered,
 )
+from gliderwatch.navigation.constants import SAME_OPENING
 from gliderwatch.navigation.flight import downsample
 from gliderwatch.pipeline import GliderState
 from gliderwatch.store import codec

@@ -19,7 +19,8 @@ from gliderwatch.model import (
     SegmentId,
     Unusable,
 )
-from gliderwatch.navigation.clock import SAME_OPENING, ClockStep
+from gliderwatch.navigation.clock import ClockStep
+from gliderwatch.navigation.constants import SAME_OPENING
 from gliderwatch.navigation.geodesy import to_plane
 from gliderwatch.pipeline import GliderState, Outcome
 from gliderwatch.store import codec, outbox, retention, segments
