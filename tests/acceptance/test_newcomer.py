@@ -223,6 +223,7 @@ main(["score", "--out", "out"])
 """
 
 
+@pytest.mark.slow
 def test_a_score_that_is_stopped_while_it_hands_out_tasks_ends_as_well(tmp_path: Path) -> None:
     """There Ctrl-C came outside what ends the workers, and the command ran all its cells to the end."""
     words = [sys.executable, "-c", STOPPED_AT_THE_THIRD_TASK]

@@ -10,24 +10,33 @@ from __future__ import annotations
 
 import gc
 import multiprocessing
+import multiprocessing.forkserver
 import os
 import signal
 import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from subprocess import CompletedProcess, TimeoutExpired
 
 CONTEXT = multiprocessing.get_context("forkserver")
-CONTEXT.set_forkserver_preload(
-    [
-        "gliderwatch.cli.main",
-        "gliderwatch.cli.doctor",
-        "gliderwatch.service.daemon",
-        "gliderwatch.service.replay",
-    ]
-)
+CONTEXT.set_forkserver_preload(["acceptance.preload"])
+
+
+@cache
+def _start_server() -> None:
+    """Start the server, once: on 3.11 it looks for what it loads where Python does, not where pytest does."""
+    before = os.environ.get("PYTHONPATH")
+    os.environ["PYTHONPATH"] = str(Path(__file__).parents[1])
+    try:
+        multiprocessing.forkserver.ensure_running()
+    finally:
+        if before is None:
+            del os.environ["PYTHONPATH"]
+        else:
+            os.environ["PYTHONPATH"] = before
 
 
 def _main(arguments: Sequence[str], env: Mapping[str, str], cwd: Path, outputs: Sequence[Path]) -> None:
@@ -59,6 +68,7 @@ def run(arguments: Sequence[str], env: Mapping[str, str], cwd: Path, timeout: fl
         outputs = [Path(folder, name) for name in ("stdout", "stderr")]
         for path in outputs:
             path.touch()
+        _start_server()
         process = CONTEXT.Process(target=_main, args=(arguments, dict(env), cwd, outputs))
         process.start()
         process.join(timeout)
@@ -74,6 +84,7 @@ class Service:
     """A command that runs on, with what tests use of `subprocess.Popen`. What it says is added to a file."""
 
     def __init__(self, arguments: Sequence[str], env: Mapping[str, str], log: Path) -> None:
+        _start_server()
         self._process = CONTEXT.Process(target=_main, args=(arguments, dict(env), Path.cwd(), [log, log]))
         self._process.start()
 

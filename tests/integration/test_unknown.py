@@ -70,6 +70,13 @@ def mission(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[
     return folder, sorted(found, key=lambda f: f[1].id)
 
 
+@pytest.fixture(scope="module")
+def begun(mission) -> Store:
+    """What the files before the trouble lead to: as they are, and from where they lie."""
+    folder, files = mission
+    return fed(Live([folder / "cache"]), [(path, s.last_t) for path, s in files], onset(files)).store
+
+
 @pytest.fixture
 def copied(mission, tmp_path: Path) -> tuple[Path, list[tuple[Path, float]]]:
     """A folder of its own with these files, and when each of them came (s)."""
@@ -113,6 +120,12 @@ def fed(live: Live, files: Sequence[tuple[Path, float]], count: int | None = Non
     return live
 
 
+def gone_on(live: Live, begun: Store, files: Sequence[tuple[Path, float]], count: int | None = None) -> Live:
+    """The same where the files before the trouble are those of `begun`."""
+    begun._db.backup(live.store._db)
+    return fed(live, files[onset(files) : count])
+
+
 def is_told_once_and_in_time(live: Live, files: Sequence[tuple[Path, float]]) -> Alert:
     first, *more = live.unknown
     began = files[onset(files)][1]
@@ -131,41 +144,43 @@ def test_healthy_dives_say_nothing(copied) -> None:
     assert live.unknown == []
 
 
-def test_files_that_wait_for_a_cache(copied) -> None:
+def test_files_that_wait_for_a_cache(copied, begun: Store) -> None:
     folder, files = copied
     for path, _ in files[onset(files) :]:
         other_sensors(path)
-    live = fed(Live([folder / "cache"]), files)
+    live = gone_on(Live([folder / "cache"]), begun, files)
     assert len(live.store.files(Status.WAITING)) > 60
     first = is_told_once_and_in_time(live, files)
     assert f"cache file deadbeef.cac is missing: not in {folder / 'cache'}" in first.body
     assert "Copy deadbeef.cac from the dockserver" in first.body
 
 
-def test_files_that_are_all_quarantined(copied) -> None:
+def test_files_that_are_all_quarantined(copied, begun: Store) -> None:
     folder, files = copied
     for path, _ in files[onset(files) :]:
         garbled(path)
-    live = fed(Live([folder / "cache"]), files)
+    live = gone_on(Live([folder / "cache"]), begun, files)
     assert len(live.store.files(Status.QUARANTINED)) > 60
     first = is_told_once_and_in_time(live, files)
     assert "files: damaged" in first.body
     assert "Copy the files from the glider or the dockserver again" in first.body
 
 
-def test_files_in_which_there_is_nothing(copied) -> None:
+def test_files_in_which_there_is_nothing(copied, begun: Store) -> None:
     folder, files = copied
     for path, _ in files[onset(files) :]:
         cut(path)
-    live = fed(Live([folder / "cache"]), files)
+    live = gone_on(Live([folder / "cache"]), begun, files)
     assert len(live.store.files(Status.TAKEN)) == len(files)
     first = is_told_once_and_in_time(live, files)
     assert "its file holds no data" in first.body and "send them from the glider again" in first.body
 
 
-def test_files_that_an_error_of_the_program_quarantines(copied, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_that_an_error_of_the_program_quarantines(
+    copied, begun: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder, files = copied
-    live = fed(Live([folder / "cache"]), files, onset(files))
+    live = gone_on(Live([folder / "cache"]), begun, files, onset(files))
 
     def broken(*_: object) -> None:
         raise ZeroDivisionError("float division by zero")
@@ -176,10 +191,10 @@ def test_files_that_an_error_of_the_program_quarantines(copied, monkeypatch: pyt
     assert "ZeroDivisionError" in first.body and "please report it" in first.body
 
 
-def test_dives_that_come_and_have_no_flag(copied) -> None:
+def test_dives_that_come_and_have_no_flag(copied, begun: Store) -> None:
     """Nothing is wrong with the files, but the glider sends nothing any more that tells its speed."""
     folder, files = copied
-    live = fed(Live([folder / "cache"]), files, onset(files))
+    live = gone_on(Live([folder / "cache"]), begun, files, onset(files))
     for path, at in files[onset(files) :]:
         segment = without(decode(path, [folder / "cache"]), *UNSEEN)
         found = judgement.judge(path, live.store, live.caches, lambda glider: True)
@@ -203,13 +218,13 @@ def without(segment: Segment, *names: str) -> Segment:
     return replace(segment, quantities=held)
 
 
-def test_it_clears_itself_when_the_cache_comes(copied) -> None:
+def test_it_clears_itself_when_the_cache_comes(copied, begun: Store) -> None:
     folder, files = copied
     lost = files[onset(files) : onset(files) + 20]
     whole = {path: path.read_bytes() for path, _ in lost}
     for path, _ in lost:
         other_sensors(path)
-    live = fed(Live([folder / "cache"]), files, onset(files) + 20)
+    live = gone_on(Live([folder / "cache"]), begun, files, onset(files) + 20)
     assert live.unknown[0].kind == Kind.UNKNOWN
     for path, _ in lost:
         path.write_bytes(whole[path])
@@ -234,12 +249,13 @@ def test_not_of_a_glider_that_is_muted_or_recovered(copied, attention: Attention
     [(48.0, None, 48.0), (None, 16, 48.0), (None, None, None), (6.0, None, 6.0)],
 )
 def test_its_limits_are_those_of_the_glider(
-    copied, hours: float | None, dives: int | None, expected: float | None
+    copied, begun: Store, hours: float | None, dives: int | None, expected: float | None
 ) -> None:
     folder, files = copied
     for path, _ in files[onset(files) :]:
         other_sensors(path)
-    live = fed(Live([folder / "cache"], Attention(unknown_hours=hours, unknown_dives=dives)), files)
+    live = Live([folder / "cache"], Attention(unknown_hours=hours, unknown_dives=dives))
+    gone_on(live, begun, files)
     if expected is None:
         assert live.unknown == []
         return
@@ -257,13 +273,13 @@ def test_an_archive_that_is_taken_in_is_no_news(copied) -> None:
 
 
 @pytest.mark.parametrize("spoil", [other_sensors, garbled, cut])
-def test_a_replay_says_what_was_said_live(copied, spoil: Callable[[Path], None]) -> None:
+def test_a_replay_says_what_was_said_live(copied, begun: Store, spoil: Callable[[Path], None]) -> None:
     folder, files = copied
     for path, _ in files[onset(files) :]:
         spoil(path)
     told = replay(Request((folder / "gliders",), (folder / "cache",))).store.alerts()
     told = [a for a in told if "/unknown/" in a.incident]
-    live = fed(Live([folder / "cache"]), files)
+    live = gone_on(Live([folder / "cache"]), begun, files)
     assert [a.kind for a in told] == [a.kind for a in live.unknown]
     assert [a.incident for a in told] == [a.incident for a in live.unknown]
     assert [a.time for a in told] == pytest.approx([a.time for a in live.unknown], abs=HOUR)

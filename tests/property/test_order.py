@@ -30,7 +30,7 @@ EAGER = GliderParams(
 """So easily alarmed that incidents come and go."""
 
 
-LONG = ("electa-2022", "george-2024", "maria-2022")
+LONG = ("electa-2022", "george-2024", "maria-2022", "usf-sam-2019")
 
 
 def assert_same(found: Ending, expected: Ending) -> None:
