@@ -208,3 +208,43 @@ def test_a_new_way_of_flying_is_seen_by_depth_rate_and_pitch_where_the_way_hides
     speed, sigma = verdicts[22].by_reckoning
     assert speed == pytest.approx(0.92 * own, abs=0.01) and sigma < 0.03
     assert set(flags(verdicts[22:])) == {Flag.NORMAL}
+
+
+# --------------------------------------------------------------------------- what a speed means
+
+
+@pytest.mark.parametrize("part", [0.5, 0.3])
+def test_a_speed_means_one_thing_whatever_range_is_configured(part):
+    made = ways(26, 3, lambda k: 0.7 * (k // 5))
+    dives = mission([*made[:20], *(slower(way, part) for way in made[20:])])
+    speeds = []
+    for params in (PARAMS, replace(PARAMS, learning=None), replace(PARAMS, learning=None, low=0.1, high=0.3)):
+        _, verdicts = run(dives, params)
+        speeds.append([v.info.estimate.speed for v in verdicts])
+    for each in speeds[1:]:
+        assert each == pytest.approx(speeds[0], abs=0.002)
+
+
+def test_a_slow_spell_is_over_with_the_first_dives_that_are_as_usual():
+    made = ways(45, 3, lambda k: 0.7 * (k // 5))
+    _, verdicts = run(mission([slower(way, 0.15) if 15 <= k < 29 else way for k, way in enumerate(made)]))
+    assert flags(verdicts[22:29]) == [Flag.ANOMALY] * 7
+    assert flags(verdicts[29:]) == [Flag.NORMAL] * 16
+
+
+@pytest.mark.parametrize(("major", "minor"), [(0.7, 0.5), (0.7, -0.5), (0.4, 0.1)])
+def test_a_tide_of_a_shelf_sea_is_no_fault(major, minor):
+    """Half a month in an M2 tide: no flag, and from day 3 the speed to 1 cm/s."""
+    omega, made = 2 * math.pi / 44714.16, []
+    left = np.sinc(omega * 1.5 * 3600 / math.pi)  # of the tide in the mean over a dive of 3 h
+    for k in range(110):
+        angle = omega * 11400.0 * k
+        made.append(
+            Way(
+                heading=0.7 * (k // 5),
+                flow=(float(left * major * np.cos(angle)), float(left * minor * np.sin(angle))),
+            )
+        )
+    _, verdicts = run(mission(made))
+    assert set(flags(verdicts)) == {Flag.NORMAL}
+    assert max(abs(v.info.estimate.speed - 0.23) for v in verdicts[24:]) < 0.01

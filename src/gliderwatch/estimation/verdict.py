@@ -229,11 +229,12 @@ def step(
     ``frozen``: an incident is open, so that nothing is learnt of what is normal.
     """
     at = setting(dive.features)
-    learnt = speed_range(state.normal, at, params.learning) if params.learning else None
+    known = speed_range(state.normal, at, params.learning or RangeParams())
+    learnt = known if params.learning else None
     normal = learnt or SpeedRange(params.low, (params.low + params.high) / 2, params.high, 0)
     roll = _roll_step(state, dive)
     rolled = state.rolled + 1 if roll > ROLL_STEP else 0
-    usual = learnt.usual if learnt else None
+    usual = known.usual if known else None  # whatever the bounds are: a speed means one thing
     # the first of two dives may have been half over when it happened
     hint = (LOST if roll > ROLL_LOST else ROLLED) if 1 <= rolled <= 2 else None
     kinematic = kinematic_speed(state.ratios, dive.features)
@@ -465,8 +466,9 @@ def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: S
     if own is not None and own[1] < (2 if info.seen.is_free else 1) * OWN_SURE * own[0]:
         state = replace(state, ratios=learn_ratios(state.ratios, dive.features, own[0]))
     # where a surfacing was not seen several dives are one, perhaps the short ones of a launch
-    if params.learning is None or info.proven is not None or dive.features.surfacing_unseen:
+    if info.proven is not None or dive.features.surfacing_unseen:
         return state
     before = state.filter.dives - 1 if state.filter else 0
-    normal = learn(state.normal, info.estimate.speed, at, dive.features.duration, params.learning, before)
+    learning = params.learning or RangeParams()
+    normal = learn(state.normal, info.estimate.speed, at, dive.features.duration, learning, before)
     return replace(state, normal=normal)
