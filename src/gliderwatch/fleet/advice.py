@@ -9,6 +9,7 @@ is advised; where none is, nothing.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import cos, tau
@@ -142,15 +143,12 @@ def leg_samples(leg: Leg, heading: float, box: Box) -> Array:
 
 def gains(cov: Array, leg: Leg, headings: Sequence[float], box: Box, params: FieldParams) -> list[float]:
     """By how much J falls once a leg is flown, by its heading: tr(M C Phi' (R + Phi C Phi')^-1 Phi C)."""
-    legs = [_measurement(leg, heading, box, params) for heading in headings]
-    phi = np.vstack([rows for rows, _ in legs])
+    parts, phi, noise = _measurements([(leg, heading) for heading in headings], box, params)
     seen = phi @ cov
     weighed = seen @ overlap(params)
-    out, start = list[float](), 0
-    for part, noise in legs:
-        here = slice(start, start + len(part))
-        start += len(part)
-        inner = noise * np.eye(len(part)) + seen[here] @ part.T
+    out = list[float]()
+    for here in parts:
+        inner = np.diag(noise[here]) + seen[here] @ phi[here].T
         out.append(float(np.sum(np.linalg.solve(inner, seen[here]) * weighed[here])))
     return out
 
@@ -161,9 +159,7 @@ def with_planned(
     """What will be known, values apart, once other gliders have flown ``legs`` with their headings (rad)."""
     if not legs:
         return known
-    flown = [_measurement(leg, heading, box, params) for leg, heading in legs]
-    phi = np.vstack([rows for rows, _ in flown])
-    noise = np.concatenate([np.full(len(rows), variance) for rows, variance in flown])
+    _, phi, noise = _measurements(legs, box, params)
     return update(known, phi, np.zeros(len(phi)), noise)
 
 
@@ -237,11 +233,17 @@ def inside(points: Array, polygon: Array) -> NDArray[np.bool_]:
     return odd
 
 
-def _measurement(leg: Leg, heading: float, box: Box, params: FieldParams) -> tuple[Array, float]:
-    """Rows of the samples of a leg that lie in the box, and the variance of each."""
-    place = leg_samples(leg, heading, box)
+def _measurements(
+    legs: Sequence[tuple[Leg, float]], box: Box, params: FieldParams
+) -> tuple[list[slice], Array, Array]:
+    """Which samples in the box are of each leg with its heading (rad), their rows ((n, L)), and the variance
+    of each ((n,))."""
+    place = np.vstack([leg_samples(leg, heading, box) for leg, heading in legs])
     within = ((place >= 0) & (place <= 1)).all(axis=1)
-    return rows(place[within], params), seconds_of_information(params) * LEG_SAMPLES / leg.duration
+    ends = np.cumsum(within.reshape(len(legs), LEG_SAMPLES).sum(axis=1)).tolist()
+    parts = [slice(a, b) for a, b in itertools.pairwise([0, *ends])]
+    each = np.array([seconds_of_information(params) * LEG_SAMPLES / leg.duration for leg, _ in legs])
+    return parts, rows(place[within], params), np.repeat(each, LEG_SAMPLES)[within]
 
 
 def _slopes(at: Array, params: FieldParams) -> Array:

@@ -169,8 +169,15 @@ def predict(known: Information, kept: Array, noise: Array) -> Information:
     """
     s = np.sqrt(noise)
     scale = s / kept
-    inner = inverse(np.eye(len(s)) + known.d * np.outer(scale, scale))
-    return Information((np.eye(len(s)) - inner) / np.outer(s, s), inner @ (known.g * scale) / s)
+    inner = np.outer(scale, scale)
+    inner *= known.d
+    inner.flat[:: len(s) + 1] += 1.0
+    inner = inverse(inner)
+    g = inner @ (known.g * scale) / s
+    np.negative(inner, out=inner)
+    inner.flat[:: len(s) + 1] += 1.0
+    inner /= np.outer(s, s)  # symmetric to the bit, as what is kept is its lower triangle
+    return Information(inner, g)
 
 
 def elapse(known: Information, dt: float, params: FieldParams) -> Information:
@@ -253,8 +260,9 @@ def inverse(matrix: Array) -> Array:
     half, bad_too = dpotri(factor, lower=1)  # three times as fast as to solve for the unit matrix
     if bad or bad_too:
         raise np.linalg.LinAlgError("the information of a field is not positive definite")
-    below = np.tril(half, -1)
-    return np.asarray(below + below.T + np.diag(half.diagonal()))
+    whole = np.asarray(half + half.T)  # above the diagonal there is nothing
+    whole.flat[:: len(whole) + 1] = half.diagonal()
+    return whole
 
 
 def _with_samples(known: Information, batches: list[Batch], k: int, params: FieldParams) -> Information:
