@@ -1,5 +1,5 @@
-"""Gliders in one sea, beside each other and on one field: the daemon that got their files in disorder, late and
-with a kill between knows what a replay knows."""
+"""A fleet in one sea, on one field: a daemon that got its files in disorder, late and with a kill between
+knows what a replay knows."""
 
 from __future__ import annotations
 
