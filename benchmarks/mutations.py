@@ -32,7 +32,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "src" / "gliderwatch"
 TESTS = {
     "navigation": "unit/test_heuristics_navigation unit/test_dac unit/test_dives unit/test_features"
-    " unit/test_fixes unit/test_flight unit/test_flight_samples unit/test_track",
+    " unit/test_fixes unit/test_flight unit/test_flight_samples unit/test_track unit/test_clock"
+    " unit/test_pressure",
     "sea": "unit/test_heuristics_sea unit/test_gauss_markov unit/test_ocean_field unit/test_tides"
     " integration/test_ocean",
     "estimation": "unit/test_heuristics_estimation unit/test_verdict_misfit unit/test_speed_range"
@@ -47,7 +48,7 @@ TESTS = {
     "messages": "unit/test_heuristics_messages unit/test_evidence unit/test_incident_text",
     "health": "unit/test_heuristics_health unit/test_health_rules unit/test_health_incidents",
     "incidents": "unit/test_heuristics_incidents unit/test_notifications unit/test_state_machine"
-    " unit/test_overdue unit/test_unjudged unit/test_send_schedule",
+    " unit/test_overdue unit/test_unjudged unit/test_send_schedule unit/test_irregularities",
 }
 """The fast tests of each room."""
 CHANGES = {"half": 0.5, "double": 2.0}
@@ -84,7 +85,7 @@ def assigned(page: ast.Module) -> Iterator[tuple[str, ast.expr]]:
 
 def changed(value: str, how: str) -> str:
     """The text of a value that is halved or doubled; a whole number stays one and is at least 1."""
-    return repr(_times(CHANGES[how], eval(value, {"__builtins__": {}}, dict(_values()))))
+    return repr(_times(CHANGES[how], eval(value, {**_values(), "__builtins__": {}})))
 
 
 def _times(factor: float, now: object) -> object:
@@ -101,7 +102,7 @@ def _values() -> dict[str, object]:
     found: dict[str, object] = {}
     for room in TESTS:
         for name, value in constants(room):
-            found[name] = eval(value, {"__builtins__": {}}, found)
+            found[name] = eval(value, {**found, "__builtins__": {}})
     return found
 
 

@@ -7,7 +7,10 @@ import pytest
 from alert_support import DISAGREE, SLOW, incident
 from dives_by_letters import Talk as Announcer
 from dives_by_letters import World, dive
+from gliderwatch.incidents import aborts, calls
 from gliderwatch.incidents.acknowledgement import acknowledge
+from gliderwatch.incidents.constants import PLACES
+from gliderwatch.incidents.irregularities import irregularities
 from gliderwatch.incidents.notices import Unjudged
 from gliderwatch.incidents.overdue import (
     ExpectedCall,
@@ -23,8 +26,11 @@ from gliderwatch.incidents.overdue import (
 from gliderwatch.incidents.state_machine import is_severe
 from gliderwatch.incidents.unjudged import blindness
 from gliderwatch.incidents.whereabouts import drift
-from gliderwatch.model import Kind, NextSurfacing, Unusable
+from gliderwatch.model import Call, Fix, Happened, Happening, Kind, NextSurfacing, Severity, Unusable
+from gliderwatch.navigation.clock import ClockStep
 from gliderwatch.params import Attention
+from gliderwatch.pipeline import GliderState, Outcome
+from gliderwatch.store.state_file import Store
 from silent import DAY, HOUR, INTERVAL, MARGIN, T0, Clock, Sea, expected
 
 DUE = T0 + INTERVAL + MARGIN
@@ -204,3 +210,52 @@ class TestUnknown:
     def test_less_than_a_quarter_of_an_hour_is_no_dive(self, minutes, said):
         attention = Attention(unknown_hours=None, unknown_dives=1)
         assert self.blind([(0.0, minutes / 60)], HOUR, attention) == said
+
+
+class TestCalls:
+    def call(self, began: float, lasts: float = 600.0, **more) -> Call:
+        return Call("unit", "log", began, began + lasts, over=True, mission="m.mi", mission_t=began, **more)
+
+    @pytest.mark.parametrize(("apart", "reports"), [(0.45 * HOUR, 1), (0.55 * HOUR, 2)])
+    def test_two_lines_within_half_an_hour_are_of_one_abort(self, apart, reports):
+        twice = tuple(Happened(Happening.ABORTING, T0 + t, "LEAK") for t in (0.0, apart))
+        assert len(aborts.reports_in_calls([self.call(T0, happened=twice)])) == reports
+
+    @pytest.mark.parametrize(("pause", "count"), [(5.8 * HOUR, 1), (6.2 * HOUR, 2)])
+    def test_calls_of_one_fix_are_of_one_surfacing_for_six_hours(self, pause, count):
+        fix = Fix(T0, 24.0, -83.0)
+        both = [self.call(T0, fix=fix), self.call(T0 + 600.0 + pause, fix=fix)]
+        assert len(calls.surfacings(both)) == count
+
+    def test_one_call_without_a_file_is_news_and_the_second_a_warning(self):
+        one, other = self.call(T0), self.call(T0 + 3 * HOUR)
+        state, (first,) = calls.announce("unit", None, (one,), (), T0 + 2 * HOUR)
+        state, (second,) = calls.announce("unit", state, (one, other), (), T0 + 5 * HOUR)
+        assert [first.severity, second.severity] == [Severity.INFO, Severity.WARNING]
+        third = self.call(T0 + 6 * HOUR)
+        assert calls.announce("unit", state, (one, other, third), (), T0 + 8 * HOUR)[1] == []
+
+
+class TestFiles:
+    def places(self, *norths: float) -> list[Fix]:
+        """Places that follow each other in no time, by their metres to the north."""
+        return [Fix(T0 + k, 24.0 + north / 111e3, -83.0) for k, north in enumerate(norths)]
+
+    def found(self, *norths: float) -> int:
+        return len(irregularities("unit", [], self.places(*norths)))
+
+    def test_three_times_there_and_back_are_two_gliders(self):
+        assert (self.found(0, 9e3, 0, 9e3), self.found(0, 9e3, 0, 9e3, 0)) == (0, 1)
+
+    def test_places_nearer_than_5_km_are_of_one_glider(self):
+        assert (self.found(*[0, 4.7e3] * 4), self.found(*[0, 5.3e3] * 4)) == (0, 1)
+
+    @pytest.mark.parametrize(("step", "count"), [(2.9 * HOUR, 0), (3.1 * HOUR, 1)])
+    def test_a_clock_that_was_set_by_three_hours_is_reported(self, step, count):
+        assert len(irregularities("unit", [ClockStep("unit", "u-2023-1-1-1", T0, step, step)], [])) == count
+
+    def test_two_gliders_are_looked_for_among_the_last_twelve_surfacings(self):
+        store = Store.open(":memory:")
+        dives = tuple(replace(SLOW, t_dive=T0 + k * HOUR, t_surface=T0 + (k + 1) * HOUR) for k in range(20))
+        store.apply("electa", Outcome(GliderState(), T0, dives, (), None))
+        assert len(store.facts("electa").places(PLACES)) == 12

@@ -17,7 +17,7 @@ from gliderwatch.navigation.constants import (
     ENOUGH_SEGMENTS,
     FASTEST_OVER_GROUND,
     LEAST_STEP,
-    LONGEST_CALL,
+    LONGEST_PAUSE_OF_DAYS,
     LONGEST_PAUSE,
     OVERLAP,
     PAUSE,
@@ -161,7 +161,7 @@ def _step_back(overlap: float) -> float:
 
     People set clocks by whole days and hours; between the two segments is the pause that this leaves.
     """
-    for unit, pause in ((DAY, LONGEST_CALL), (HOUR, LONGEST_PAUSE)):
+    for unit, pause in ((DAY, LONGEST_PAUSE_OF_DAYS), (HOUR, LONGEST_PAUSE)):
         step = ceil((overlap - OVERLAP) / unit) * unit
         if step - overlap <= pause:
             return step

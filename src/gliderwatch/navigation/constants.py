@@ -127,7 +127,7 @@ PAUSE = 60.0
 """Seconds from the end of a segment to the opening of the next, where the step is not in whole hours."""
 LONGEST_PAUSE = 900.0
 """Seconds: a step in whole hours leaves no longer pause than this between two segments (real ones: 810)."""
-LONGEST_CALL = 3600.0
+LONGEST_PAUSE_OF_DAYS = 3600.0
 """Seconds of the same for a step in whole days, which is seldom met by chance."""
 LEAST_STEP = 3600.0
 """Seconds: a clock that was set forward by less looks like a long call."""
