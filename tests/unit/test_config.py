@@ -4,33 +4,20 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
+from config_support import MINIMAL, Write, problems
 from gliderwatch.config import Config, load
 from gliderwatch.config.loading import presets_path
 from gliderwatch.config.schema import Adaptive, Anomaly, FalseAlarm
-from gliderwatch.errors import ConfigError
 from gliderwatch.model import Severity
 from gliderwatch.params import AnomalyRule, Attention, FalseAlarmRule, GliderParams, LearnerParams
 from gliderwatch.pipeline import digest
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "config" / "gliderwatch.yml"
-MINIMAL = "dockserver: {roots: [/data]}\n"
-Write = Callable[[str], Path]
-
-
-@pytest.fixture
-def write(tmp_path: Path) -> Write:
-    def _write(text: str) -> Path:
-        path = tmp_path / "c.yml"
-        path.write_text(text, encoding="utf-8")
-        return path
-
-    return _write
 
 
 @pytest.fixture
@@ -42,13 +29,6 @@ def presets(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Write:
         return path
 
     return _presets
-
-
-def problems(path: Path) -> list[str]:
-    """The lines of the error without the folder of the file."""
-    with pytest.raises(ConfigError) as caught:
-        load(path)
-    return [line.removeprefix(f"{path.parent}/") for line in str(caught.value).splitlines()]
 
 
 # --------------------------------------------------------------------------- what loads

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from gliderwatch.config import load
-from gliderwatch.errors import ConfigError
+from config_support import MINIMAL, Write, problems
 
-MINIMAL = "dockserver: {roots: [/data]}\n"
 RECIPIENT = MINIMAL + "channels: {m: {url: 'json://h'}}\nrecipients:\n  a: {channels: [m]}\n"
-Write = Callable[[str], Path]
 
 
 def of_recipient(key: str) -> str:
@@ -23,23 +19,6 @@ def of_recipient(key: str) -> str:
 def night(hours: str) -> str:
     """One whose fifth line is quiet hours."""
     return of_recipient(f"quiet_hours: {{{hours}}}")
-
-
-@pytest.fixture
-def write(tmp_path: Path) -> Write:
-    def _write(text: str) -> Path:
-        path = tmp_path / "c.yml"
-        path.write_text(text, encoding="utf-8")
-        return path
-
-    return _write
-
-
-def problems(path: Path) -> list[str]:
-    """The lines of the error without the folder of the file."""
-    with pytest.raises(ConfigError) as caught:
-        load(path)
-    return [line.removeprefix(f"{path.parent}/") for line in str(caught.value).splitlines()]
 
 
 @pytest.mark.parametrize(

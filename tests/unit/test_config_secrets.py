@@ -4,28 +4,14 @@ from __future__ import annotations
 
 import os
 import traceback
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
 
+from config_support import MINIMAL, Write
 from gliderwatch.config import Config, load
 from gliderwatch.errors import ConfigError
-
-MINIMAL = "dockserver: {roots: [/data]}\n"
-Write = Callable[[str], Path]
-
-
-@pytest.fixture
-def write(tmp_path: Path) -> Write:
-    def _write(text: str) -> Path:
-        path = tmp_path / "c.yml"
-        path.write_text(text, encoding="utf-8")
-        return path
-
-    return _write
-
 
 SECRET = "s3cr3t-w0rd"
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gliderwatch.layers.band import Band, Mode, Tracking, follow
+from gliderwatch.layers.band import Band, Mode, Tracking, cost_slope, follow
 from gliderwatch.layers.casts import Cast, bin_of, split
 from gliderwatch.layers.composite import Composite, in_layer, layers_of
 from gliderwatch.model import Series, readonly
@@ -126,3 +126,8 @@ def test_a_day_and_a_half_in_the_band_is_the_most(hours: float, mode: Mode) -> N
 
 def test_two_casts_show_a_layer() -> None:
     assert follow(Tracking(), casts(100.0, 120.0)[:2], "temperature").mode is Mode.TRACK
+
+
+def test_the_first_step_of_the_filter() -> None:
+    """By hand: 10 m at Q = 3e-5 and R = 0.03 give s = 2 R + 100 Q = 0.063, a gain of 10 Q / s."""
+    assert cost_slope([[(10.0, 1.0)]]) == pytest.approx(1 / 210)
