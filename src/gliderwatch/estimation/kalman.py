@@ -239,8 +239,8 @@ def step(
     loss, turn, bank = _tested(state, found, passage, params)
     # where no heading was measured, what looks like a step is a turn that was not seen
     proven = None if seen.is_free else step_test.proven(loss, turn, params.alarms_per_month)
-    after = _learnt(state, _mixed(state, found.ways, _jumped(params.flow)), found, passage, across)
-    after = _opened(replace(after, bank=bank, end=dive.end), proven)
+    mixed = _mixed(state, found.ways, _jumped(params.flow))
+    after = _opened(_learnt(state, mixed, found, passage, across, bank, dive.end), proven)
     return after, JointInfo(
         seen=seen,
         estimate=_estimate(after, seen, params, slipping),
@@ -358,8 +358,8 @@ def _cov(state: JointState, way: Explained, jumped: Array) -> Array:
     return state.cov
 
 
-def _mixed(state: JointState, ways: list[Explained], jumped: Array) -> JointState:
-    """The state after a dive: the mixture of what it is under each explanation."""
+def _mixed(state: JointState, ways: list[Explained], jumped: Array) -> tuple[Array, Array]:
+    """The state after a dive and its covariance: the mixture of what they are under each explanation."""
     kept = [way for way in ways if way.weight > RARE]
     total = sum(way.weight for way in kept)
     means, covs = [], []
@@ -374,7 +374,7 @@ def _mixed(state: JointState, ways: list[Explained], jumped: Array) -> JointStat
     x = weights @ np.array(means)
     cov = sum(w * (c + np.outer(m - x, m - x)) for w, c, m in zip(weights.tolist(), covs, means, strict=True))
     cov = np.asarray(cov)
-    return replace(state, x=readonly(_bounded(x)), cov=readonly((cov + cov.T) / 2))
+    return readonly(_bounded(x)), readonly((cov + cov.T) / 2)
 
 
 def _bounded(x: Array) -> Array:
@@ -388,21 +388,27 @@ def _bounded(x: Array) -> Array:
 
 def _learnt(
     state: JointState,
-    mixed: JointState,
+    mixed: tuple[Array, Array],
     found: Explanations,
     passage: Passage,
     across: tuple[float, float] | None,
+    bank: Bank,
+    end: Fix | None,
 ) -> JointState:
-    """The state ``mixed`` with what a dive adds to the noise learnt in ``state`` and to what was wrong."""
+    """The state of which ``mixed`` is the mixture, with what a dive adds to the noise learnt in ``state`` and
+    to what was wrong."""
     square, share = _surprise(state, found, passage)
     aside = None
     if not found.best.cause.is_error and across is not None:
         aside = (across[0] / across[1]) ** 2 * state.tested / state.measurement_scale
-    return replace(
-        mixed,
+    return JointState(
+        state.t,
+        *mixed,
         process_scale=learn_process_scale(state.process_scale, square, share, state.dives),
         measurement_scale=learn_measurement_scale(state.measurement_scale, aside, state.dives),
         dives=state.dives + 1,
+        bank=bank,
+        end=end,
         wrong={each: found.odds[str(each)] for each in Cause if each.is_error and str(each) in found.odds},
     )
 

@@ -257,7 +257,7 @@ def step(
     state, flag, reason, normal = _regime(state, dive, info, kinematic, normal, flag, reason, params)
     before = earlier.usual if reason.startswith(NEW_WAY) else None
     if flag is Flag.NORMAL and not frozen and not state.other:
-        state = replace(_learnt(state, dive, info, at, params), trim=_trim(dive))
+        state = _learnt(state, dive, info, at, params)
     # where the way hardly shows the speed, it is depth rate and pitch that a new way of flying is seen by
     is_hidden = before is not None and info.estimate.speed < normal.low
     reckoned = _reckoned(kinematic, params) if is_hidden and kinematic is not None else None
@@ -398,7 +398,7 @@ def _slow_or_fast(
         if believed is None and (unseen or (not state.doubted and _may_have_turned(info, normal))):
             return replace(state, doubted=1), None, SLOW_OR_TURNED
         return state, Flag.ANOMALY, _how_slow(info, normal, params)
-    state = replace(state, doubted=0)
+    state = replace(state, doubted=0) if state.doubted else state
     if info.estimate.speed - sigma > normal.high:
         if normal.dives:
             return state, Flag.FALSE_ALARM, FASTER
@@ -432,7 +432,7 @@ def _small_losses(
     total = min(cusum(state.slow, part * departure, part * SLACK), bound + SLACK)
     if departure < SLACK / 2:
         total /= 2  # it flies as usual: what was slow is over soon
-    state = replace(state, slow=total)
+    state = replace(state, slow=total) if total != state.slow else state
     if total > bound:
         return state, Flag.ANOMALY, _how_slow(info, normal, params, "a little slow for several dives")
     return state, Flag.NORMAL, ""
@@ -459,16 +459,15 @@ def _roll_step(state: SpeedState, dive: Dive) -> float:
 
 def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: SpeedParams) -> SpeedState:
     """The state with what a normal dive teaches."""
-    roll = dive.features.roll_mean
-    if roll is not None and len(state.rolls) < 3 * BASELINE_LEAST:
-        state = replace(state, rolls=(*state.rolls, roll))
+    roll, rolls, ratios, normal = dive.features.roll_mean, state.rolls, state.ratios, state.normal
+    if roll is not None and len(rolls) < 3 * BASELINE_LEAST:
+        rolls = (*rolls, roll)
     own = info.seen.own_speed()
     if own is not None and own[1] < (2 if info.seen.is_free else 1) * OWN_SURE * own[0]:
-        state = replace(state, ratios=learn_ratios(state.ratios, dive.features, own[0]))
+        ratios = learn_ratios(ratios, dive.features, own[0])
     # where a surfacing was not seen several dives are one, perhaps the short ones of a launch
-    if info.proven is not None or dive.features.surfacing_unseen:
-        return state
-    before = state.filter.dives - 1 if state.filter else 0
-    learning = params.learning or RangeParams()
-    normal = learn(state.normal, info.estimate.speed, at, dive.features.duration, learning, before)
-    return replace(state, normal=normal)
+    if info.proven is None and not dive.features.surfacing_unseen:
+        before = state.filter.dives - 1 if state.filter else 0
+        learning = params.learning or RangeParams()
+        normal = learn(normal, info.estimate.speed, at, dive.features.duration, learning, before)
+    return replace(state, rolls=rolls, ratios=ratios, normal=normal, trim=_trim(dive))

@@ -45,7 +45,7 @@ from gliderwatch.forecast.constants import (
 )
 from gliderwatch.forecast.steering import UNSENT, WAYS, Leg, Plan, courses
 from gliderwatch.forecast.timing import quantile
-from gliderwatch.model import Array, Dive, Fix, NextSurfacing, Segment, Unusable, readonly
+from gliderwatch.model import Array, Dive, Fix, NextSurfacing, Segment, Track, Unusable, readonly
 from gliderwatch.navigation.flight import joined
 from gliderwatch.navigation.geodesy import displacement, from_plane, to_plane
 
@@ -186,16 +186,30 @@ def learn(
     end = dive.end
     if end is None:
         return state
-    after = replace(
-        _timed(state, dive, end),
+    waypoints, heading = _waypoints(state.waypoints, waypoint), _heading_flown(state, dive)
+    lengths = (
+        state.lengths if dive.track is None or heading is None else (*state.lengths, math.hypot(*heading))
+    )
+    speed, current, change = _driven(state, dive, heading)
+    intervals, errors, surface = _timed(state, dive, end)
+    return Surfacings(
+        fix=end,
+        duration=dive.t_surface - dive.t_dive,
+        intervals=intervals,
+        errors=errors,
+        surface=surface,
+        drift=_drift(state, dive),
+        heading=heading,
+        lengths=lengths[-HABIT_DIVES:],
+        speed=speed,
+        current=current,
+        change=change,
+        bearing=bearing(state),
+        waypoints=waypoints,
         scores=_scores(state, dive, end),
         misses=_misses(state, dive, end, expected),
-        bearing=bearing(state),
-        waypoints=_waypoints(state.waypoints, waypoint),
-        fix=end,
+        legs=() if waypoints else (*state.legs, *_halves(state, dive))[-LEGS_KEPT:],
     )
-    after = replace(after, legs=() if after.waypoints else (*state.legs, *_halves(state, dive))[-LEGS_KEPT:])
-    return _driven(_adrift(_flown(after, dive), state.fix, dive), dive)
 
 
 def _halves(state: Surfacings, dive: Dive) -> Iterator[Leg]:
@@ -237,22 +251,18 @@ def called(state: Surfacings, fix: Fix, waypoint: Place | None) -> Surfacings:
     return replace(state, fix=fix, waypoints=_waypoints(state.waypoints, waypoint))
 
 
-def _timed(state: Surfacings, dive: Dive, end: Fix) -> Surfacings:
-    """The state with the times of a dive."""
-    duration = dive.t_surface - dive.t_dive
+def _timed(
+    state: Surfacings, dive: Dive, end: Fix
+) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+    """Intervals, their errors, and times at the surface, with those of a dive."""
     if state.fix is None or is_unseen(dive):
-        return replace(state, duration=duration)
+        return state.intervals, state.errors, state.surface
     interval = max(end.t - state.fix.t, 1.0)
     errors = state.errors
     if state.intervals:
         errors = (*errors, timing.error(interval, timing.usual(state.intervals)))
-    return replace(
-        state,
-        duration=duration,
-        intervals=(*state.intervals, interval)[-INTERVALS_KEPT:],
-        errors=errors[-MISSES_KEPT:],
-        surface=(*state.surface, max(dive.t_dive - state.fix.t, 0.0))[-HABIT_DIVES:],
-    )
+    surface = (*state.surface, max(dive.t_dive - state.fix.t, 0.0))[-HABIT_DIVES:]
+    return (*state.intervals, interval)[-INTERVALS_KEPT:], errors[-MISSES_KEPT:], surface
 
 
 def _scores(state: Surfacings, dive: Dive, end: Fix) -> tuple[float, ...]:
@@ -291,46 +301,50 @@ def _waypoints(earlier: tuple[Place, ...], reported: Place | None) -> tuple[Plac
     return (*earlier, reported)[-WAYPOINTS_KEPT:]
 
 
-def _flown(state: Surfacings, dive: Dive) -> Surfacings:
-    """The state with the mean heading vector of a dive, from fix to fix."""
-    if dive.track is None:
-        return state
-    dt = np.diff(dive.track.t)
-    east, north = (dt @ dive.track.heading / dt.sum()).tolist()
-    return replace(
-        state, heading=(east, north), lengths=(*state.lengths, math.hypot(east, north))[-HABIT_DIVES:]
-    )
+def _heading_flown(state: Surfacings, dive: Dive) -> Vector | None:
+    """The mean heading vector of a dive, from fix to fix; that of the last one where it is not known."""
+    return state.heading if dive.track is None else _mean_heading(dive.track)
 
 
-def _adrift(state: Surfacings, before: Fix | None, dive: Dive) -> Surfacings:
-    """The state with the drift at the surface before a dive."""
+@lru_cache(maxsize=64)  # a dive comes again when its current is corrected
+def _mean_heading(track: Track) -> Vector:
+    dt = track.t[1:] - track.t[:-1]
+    east, north = (dt @ track.heading / dt.sum()).tolist()
+    return east, north
+
+
+def _drift(state: Surfacings, dive: Dive) -> Vector:
+    """The drift at the surface with that before a dive."""
+    before = state.fix
     if before is None or dive.start is None or state.current is None or _is_stale(dive):
-        return state
+        return state.drift
     time = dive.start.t - before.t
     if time < LONG_DRIFT or is_unseen(dive):
-        return state
+        return state.drift
     moved = displacement(dive.start.lat, dive.start.lon, before.lat, before.lon)
-    beside = moved / time - state.current  # that of the dive before
-    east, north = (1 - DRIFT_GAIN) * np.array(state.drift) + DRIFT_GAIN * np.clip(
-        beside, -FASTEST_DRIFT, FASTEST_DRIFT
-    )
-    return replace(state, drift=(float(east), float(north)))
+    east, north = (
+        (1 - DRIFT_GAIN) * old + DRIFT_GAIN * min(max(way / time - flow, -FASTEST_DRIFT), FASTEST_DRIFT)
+        for old, way, flow in zip(state.drift, moved.tolist(), state.current, strict=True)
+    )  # the current is that of the dive before
+    return east, north
 
 
-def _driven(state: Surfacings, dive: Dive) -> Surfacings:
-    """The state with the current of a dive, and the speed that the glider believes."""
+def _driven(
+    state: Surfacings, dive: Dive, heading: Vector | None
+) -> tuple[float | None, Vector | None, float]:
+    """The speed that the glider believes, the current, and its usual change, with those of a dive."""
     if dive.current is None:
-        return state
+        return state.speed, state.current, state.change
     current, change = (dive.current.u, dive.current.v), state.change
     if state.current is not None:
         square = math.dist(current, state.current) ** 2 / 2
         change = DIVE_MEMORY * change + (1 - DIVE_MEMORY) * min(square, WILD_CHANGE * change)
-    over_ground, heading = ground(dive), np.array(state.heading or (0.0, 0.0))
+    over_ground, way = ground(dive), np.array(heading or (0.0, 0.0))
     speed = state.speed
-    if dive.track is not None and over_ground is not None and np.hypot(*heading) >= STEADY_HEADING:
-        own = float((over_ground - current) @ heading / (heading @ heading))
+    if dive.track is not None and over_ground is not None and np.hypot(*way) >= STEADY_HEADING:
+        own = float((over_ground - current) @ way / (way @ way))
         speed = min(max(own, SLOWEST), FASTEST)
-    return replace(state, current=current, change=change, speed=speed)
+    return speed, current, change
 
 
 # ----------------------------------------

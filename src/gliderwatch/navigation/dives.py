@@ -195,12 +195,11 @@ def extend(state: Navigation, segment: Segment) -> tuple[Navigation, list[Dive]]
     state, step = _with_clock(state, segment, fixes)
     fixes = new_fixes(fresh, state.fix) if step else fixes
     fresh, surface = zeroed(fresh, fixes, state.surface_depth)
-    state = replace(state, surface_depth=surface)
     samples = concatenated(state.carry, fresh)
     reports, last_reported = new_reports(segment, state.declination or 0.0, state.last_reported)
     quality = segment_notes(segment, state.declination, from_model=state.declination_t is None)
     quality += corrected_notes(step, surface)
-    state = replace(_placed(state, segment, fresh, quality), last_reported=last_reported)
+    state = _placed(state, segment, fresh, quality, surface, last_reported)
 
     before = state.dive
     if "fix_lat" in state.carry:
@@ -247,8 +246,16 @@ def _with_declination(state: Navigation, segment: Segment) -> Navigation:
     return replace(state, declination=segment.declination, declination_t=None)
 
 
-def _placed(state: Navigation, segment: Segment, fresh: Samples, quality: tuple[str, ...]) -> Navigation:
-    """The state with the place of a segment in time: a hole before it, and whether it holds the flight."""
+def _placed(
+    state: Navigation,
+    segment: Segment,
+    fresh: Samples,
+    quality: tuple[str, ...],
+    surface_depth: float,
+    last_reported: LastReported,
+) -> Navigation:
+    """The state with the place of a segment in time: a hole before it, and whether it holds the flight; and
+    with what depth and currents it reported."""
     holes, calls = state.holes, state.calls
     if state.last_t is not None and segment.id.opened_at - state.last_t > SHORTEST_HOLE:
         gap = (state.last_t, segment.id.opened_at)
@@ -266,6 +273,8 @@ def _placed(state: Navigation, segment: Segment, fresh: Samples, quality: tuple[
         last_t=max(segment.last_t, state.last_t or segment.last_t),
         holder=segment.id.name if flies or not state.holder else state.holder,
         latest=segment.id.name,
+        surface_depth=surface_depth,
+        last_reported=last_reported,
     )
 
 
