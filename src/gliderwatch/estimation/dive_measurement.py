@@ -92,22 +92,22 @@ class Observation:
         rest, length = self.rest, self.steadiness
         if rest is None or length < 0.1:
             return None
-        along = self.heading / length
-        speed = float(rest @ along) / length
-        return speed, math.sqrt(self._rest_var(speed, along)) / length
+        (u, v), (east, north) = rest.tolist(), (self.heading / length).tolist()
+        speed = (u * east + v * north) / length
+        return speed, math.sqrt(self._rest_var(speed, east, north)) / length
 
     def across(self, speed: float) -> tuple[float, float] | None:
         """What of g - c is across the heading, left positive, and its standard error (m/s) at that W."""
         rest, length = self.rest, self.steadiness
         if rest is None or length < 1e-3 or self.is_free:
             return None
-        aside = np.array([-self.heading[1], self.heading[0]]) / length
-        return float(rest @ aside), math.sqrt(self._rest_var(speed, aside))
+        (u, v), (x, y) = rest.tolist(), (self.heading / length).tolist()
+        return v * x - u * y, math.sqrt(self._rest_var(speed, -y, x))
 
-    def _rest_var(self, speed: float, way: Array) -> float:
-        """Variance (m2/s2) of g - c along a unit vector ((2,)) at that W."""
-        cov = self.ground_cov + speed**2 * self.heading_cov
-        return float(way @ cov @ way) + self.current_sigma**2
+    def _rest_var(self, speed: float, east: float, north: float) -> float:
+        """Variance (m2/s2) of g - c along a unit vector at that W."""
+        (a, b), (c, d) = (self.ground_cov + speed**2 * self.heading_cov).tolist()
+        return (east * a + north * c) * east + (east * b + north * d) * north + self.current_sigma**2
 
 
 def observe(dive: Dive) -> Observation:

@@ -143,7 +143,7 @@ def _numbers(verdict: Verdict, info: JointInfo) -> dict[str, float]:
         "slip_sigma": found.slip[1],
         "side": found.side[0],
         "side_sigma": found.side[1],
-        "flow_sigma": sqrt(float(np.trace(found.flow_cov)) / 2),
+        "flow_sigma": sqrt(float(found.flow_cov[0, 0] + found.flow_cov[1, 1]) / 2),
         "nis": info.nis / info.dof,
     }
     out |= _usual(verdict)

@@ -422,7 +422,7 @@ def _surprise(state: JointState, found: Explanations, passage: Passage) -> tuple
     at = slice(2, 4) if len(usual.innovation) > 3 else slice(0, 2)  # the current, else the ground velocity
     rows, e = usual.rows[at], usual.innovation[at]
     inverse = np.linalg.inv(rows @ state.cov[-SHOWN:, -SHOWN:] @ rows.T + usual.noise[at, at])
-    return float(e @ inverse @ e) / 2, float(np.trace(inverse)) / 2 * passage.restless
+    return float(e @ inverse @ e) / 2, float(inverse[0, 0] + inverse[1, 1]) / 2 * passage.restless
 
 
 def _across(

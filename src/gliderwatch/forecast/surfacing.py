@@ -274,11 +274,13 @@ def _scores(state: Surfacings, dive: Dive, end: Fix) -> tuple[float, ...]:
     if over_ground is None or speed is None or current is None or state.fix is None or state.heading is None:
         return state.scores
     met = current if dive.current is None else (dive.current.u, dive.current.v)
-    really = (over_ground - met) / speed
+    u, v = over_ground.tolist()
+    east, north = (u - met[0]) / speed, (v - met[1]) / speed
     made, scores = courses(plan(state, speed, current), max(end.t - state.fix.t, 1.0)), []
     for score, course in zip(state.scores, made, strict=True):
         part = (1 - DIVE_MEMORY) * (1 - course.unknown)
-        square = min(float(np.sum((course.heading - really) ** 2)), WORST_COURSE)
+        x, y = course.heading.tolist()
+        square = min((x - east) ** 2 + (y - north) ** 2, WORST_COURSE)
         scores.append((1 - part) * score + part * square)
     return tuple(scores)
 
@@ -290,8 +292,9 @@ def _misses(state: Surfacings, dive: Dive, end: Fix, expected: NextSurfacing | N
     if state.fix is None or expected.after != state.fix.t:
         return state.misses
     off = displacement(end.lat, end.lon, expected.lat, expected.lon)
-    cov = np.array([[expected.east, expected.cross], [expected.cross, expected.north]])
-    distance = math.sqrt(float(off @ np.linalg.solve(cov, off)) / CHI2_COVERED) * factor(state.misses)
+    (x, y), east, north, cross = off.tolist(), expected.east, expected.north, expected.cross
+    square = (x * x * north - 2 * x * y * cross + y * y * east) / (east * north - cross**2)
+    distance = math.sqrt(square / CHI2_COVERED) * factor(state.misses)
     return (*state.misses, distance)[-MISSES_KEPT:]
 
 
@@ -361,6 +364,8 @@ def _driven(
 
 __all__ = ["Flow", "Surfacings", "expect", "learn"]
 
+_BOTH = readonly(np.eye(2))
+"""What two components have alike."""
 Flow = Callable[[float, float], tuple[Array, Array]]
 """Mean flow (m/s, (2,): east, north) between two times (s), and its covariance (m2/s2, (2, 2))."""
 
@@ -388,11 +393,11 @@ def expect(
     displacement = dive * over_ground + at_surface * (water + np.array(state.drift))
     cov = factor(state.misses) ** 2 * (
         interval**2 * water_cov
-        + dive**2 * (speed_sigma**2 * np.outer(heading, heading) + own**2 * heading_cov)
-        + t_sigma**2 * np.outer(over_ground, over_ground)
-        + GPS_ERROR**2 * np.eye(2)
+        + dive**2 * (speed_sigma**2 * (heading[:, None] * heading) + own**2 * heading_cov)
+        + t_sigma**2 * (over_ground[:, None] * over_ground)
+        + GPS_ERROR**2 * _BOTH
     )
-    lat, lon = from_plane(displacement, fix.lat, fix.lon)
+    lat, lon = from_plane(displacement.tolist(), fix.lat, fix.lon)
     return NextSurfacing(
         after=fix.t,
         t=fix.t + interval,
@@ -424,11 +429,11 @@ def _water(state: Surfacings, forecast: Array, cov: Array) -> tuple[Array, Array
     """
     if state.current is None:
         return forecast, cov, 1.0
-    theirs, last = float(np.trace(cov)) / 2, state.change
+    theirs, last = float(cov[0, 0] + cov[1, 1]) / 2, state.change
     common = ALIKE * (theirs * last) ** 0.5
     share = min(max((last - common) / (last + theirs - 2 * common), 0.0), 1.0)
     mean = share * forecast + (1 - share) * np.array(state.current)
-    return mean, share * cov + (1 - share) * last * np.eye(2), share
+    return mean, share * cov + (1 - share) * last * _BOTH, share
 
 
 def _heading(state: Surfacings, speed: float, flow: Array, dive: float) -> tuple[Array, Array, str]:
@@ -447,7 +452,7 @@ def _heading(state: Surfacings, speed: float, flow: Array, dive: float) -> tuple
     off = vectors - mean
     unknown = np.array([course.unknown for course in made])
     own = float(weights @ (scores + unknown**2)) / 2
-    cov = np.asarray((weights[:, None] * off).T @ off + own * np.eye(2))
+    cov = np.asarray((weights[:, None] * off).T @ off + own * _BOTH)
     best = int(np.argmax(weights))
     if not state.waypoints:
         return mean, cov, UNSENT if state.legs and best == len(WAYS) - 1 else WAYS[0]
