@@ -9,9 +9,11 @@ declination depends on, so that `navigation.geodesy` rotates them once it is kno
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from enum import IntEnum, StrEnum
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +26,33 @@ def readonly(values: object) -> Array:
     array = np.array(values, dtype=np.float64)
     array.flags.writeable = False
     return array
+
+
+if TYPE_CHECKING:
+    # so that names and types of what changes are checked
+    from dataclasses import replace as replace  # noqa: PLC0414 (for others)
+else:
+
+    def replace(value: Any, **changes: Any) -> Any:
+        """As `dataclasses.replace`, for plain frozen values with slots, in half of the time: a dive makes
+        some thirty values anew. Raises TypeError for a name that is no field."""
+        made, left = object.__new__(type(value)), len(changes)
+        for name, get, put in _members(type(value)):
+            if name in changes:
+                put(made, changes[name])
+                left -= 1
+            else:
+                put(made, get(value))
+        if left:
+            raise TypeError(f"{type(value).__name__} has not all the fields {', '.join(changes)}")
+        return made
+
+
+@cache
+def _members(kind: type) -> tuple[tuple[str, Callable[..., Any], Callable[..., None]], ...]:
+    """The fields of a dataclass with slots: name, how it is got and how it is put."""
+    slots = ((each.name, kind.__dict__[each.name]) for each in fields(kind))
+    return tuple((name, slot.__get__, slot.__set__) for name, slot in slots)
 
 
 # --------------------------------------------------------------------------- input

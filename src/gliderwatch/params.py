@@ -84,6 +84,10 @@ class GliderParams:
     learner: LearnerParams = field(default_factory=LearnerParams)
     rules: RuleParams = field(default_factory=RuleParams)
 
+    def __hash__(self) -> int:
+        """Of some of the settings: it is asked for several times a dive, and parameters are few."""
+        return hash((self.speed_min, self.speed_max, self.estimator, self.reference, self.alarms_per_month))
+
     @property
     def compares_own_current(self) -> bool:
         """Whether a dive is compared with the current that the glider itself measured."""

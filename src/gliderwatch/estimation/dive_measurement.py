@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from statistics import median
 
@@ -40,7 +40,7 @@ from gliderwatch.estimation.constants import (
     USUAL_PITCH,
 )
 from gliderwatch.estimation.kinematic_speed import KinematicSpeed
-from gliderwatch.model import Array, Dive, Fix, Track, readonly
+from gliderwatch.model import Array, Dive, Fix, Track, readonly, replace
 from gliderwatch.navigation.geodesy import displacement
 from gliderwatch.navigation.track import flown as flying_in
 
@@ -107,7 +107,8 @@ class Observation:
     def _rest_var(self, speed: float, east: float, north: float) -> float:
         """Variance (m2/s2) of g - c along a unit vector at that W."""
         (a, b), (c, d) = (self.ground_cov + speed**2 * self.heading_cov).tolist()
-        return (east * a + north * c) * east + (east * b + north * d) * north + self.current_sigma**2
+        along = (east * a + north * c) * east + (east * b + north * d) * north
+        return float(along) + self.current_sigma**2
 
 
 def observe(dive: Dive) -> Observation:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from math import hypot, sqrt
 
@@ -25,7 +25,7 @@ from gliderwatch.estimation.unassessed import (
 )
 from gliderwatch.estimation.verdict import SpeedParams, SpeedState, Verdict
 from gliderwatch.estimation.verdict import step as step_speed
-from gliderwatch.model import Assessment, Current, Dive, Flag
+from gliderwatch.model import Assessment, Current, Dive, Flag, replace
 from gliderwatch.papers.flags import FlowMaxima, p_e, update
 from gliderwatch.params import GliderParams
 from gliderwatch.sea import flow_forecast as currents

@@ -125,13 +125,14 @@ def compare(baseline: Baseline, features: DiveFeatures) -> Mapping[str, Usual]:
     row = _row(features)
     dives = _dives(baseline)
     dives = dives[_same_setting(dives, row)]
-    measured = np.isfinite(dives)
-    same = {given: _same_trim(dives, row, given) for given in _GIVEN}
+    columns = dives.T.tolist()
+    same = {given: _same_trim(dives, row, given).tolist() for given in _GIVEN}
     out = {}
-    for i, (quantity, value) in enumerate(zip(QUANTITIES, row.tolist(), strict=False)):
+    for quantity, value, column in zip(QUANTITIES, row.tolist(), columns, strict=False):
         if isfinite(value):
-            have = measured[:, i]
-            usual = _usual(dives[have, i].tolist(), same[quantity.given][have].tolist(), quantity)
+            told = [isfinite(each) for each in column]
+            alike = list(compress(same[quantity.given], told))
+            usual = _usual(list(compress(column, told)), alike, quantity)
             if usual is not None:
                 out[quantity.name] = Usual(value, *usual)
     return MappingProxyType(out)
@@ -212,12 +213,10 @@ def _usual(values: list[float], alike: list[bool], quantity: Quantity) -> tuple[
 
 def _same_trim(dives: Array, row: Array, given: tuple[str, ...]) -> NDArray[np.bool_]:
     """Whether each dive had the same of what a number depends on, as far as both tell."""
-    same = np.ones(len(dives), dtype=bool)
-    for name in given:
-        quantity, column = _BY_NAME[name], _COLUMN[name]
-        apart = np.abs(dives[:, column] - row[column])
-        same &= ~(apart > max(quantity.least, quantity.part * abs(row[column])))
-    return same
+    columns = [_COLUMN[name] for name in given]
+    here, quantities = row[columns], [_BY_NAME[name] for name in given]
+    most = [max(q.least, q.part * abs(v)) for q, v in zip(quantities, here.tolist(), strict=True)]
+    return np.asarray(~(np.abs(dives[:, columns] - here) > most).any(axis=1))
 
 
 def _range(values: list[float], quantity: Quantity) -> tuple[float, float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache, lru_cache
 
 import numpy as np
@@ -54,7 +54,7 @@ from gliderwatch.estimation.modes import (
     switched,
 )
 from gliderwatch.estimation.step_test import Bank, Step, Update
-from gliderwatch.model import Array, Dive, Fix, readonly
+from gliderwatch.model import Array, Dive, Fix, readonly, replace
 from gliderwatch.sea import gauss_markov
 from gliderwatch.sea.gauss_markov import FlowParams, Passage
 

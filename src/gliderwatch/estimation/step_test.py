@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache, lru_cache
 
 import numpy as np
@@ -19,7 +19,7 @@ from gliderwatch.estimation.constants import (
     WINDOW,
 )
 from gliderwatch.estimation.dive_measurement import SIDE, SLIP
-from gliderwatch.model import Array, readonly
+from gliderwatch.model import Array, readonly, replace
 
 # ----------------------------------------
 # Evidence over several dives. Pure.

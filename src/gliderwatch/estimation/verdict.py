@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from math import degrees, inf
 from statistics import median
@@ -50,7 +50,7 @@ from gliderwatch.estimation.speed_range import (
     speed_range,
 )
 from gliderwatch.estimation.step_test import cusum, cusum_bound
-from gliderwatch.model import Array, Dive, Flag
+from gliderwatch.model import Array, Dive, Flag, replace
 
 # ----------------------------------------
 # Do the fixes, the compass and the current of a dive agree, and who is wrong if they do not? Pure.

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
 
-from gliderwatch.model import Dive, DiveFeatures, Fix, Segment, Series, Unusable, readonly
+from gliderwatch.model import Dive, DiveFeatures, Fix, Segment, Series, Unusable, readonly, replace
 from gliderwatch.navigation.clock import forward_step, span
 from gliderwatch.navigation.constants import (
     CURRENT_EARLY,

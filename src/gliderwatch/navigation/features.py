@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import atan2, degrees
 from statistics import median
 
 import numpy as np
 
-from gliderwatch.model import DiveFeatures, Series, Track
+from gliderwatch.model import DiveFeatures, Series, Track, replace
 from gliderwatch.navigation.constants import (
     DEPTHS_FOR_DEEPEST,
     DEPTHS_FOR_RATES,

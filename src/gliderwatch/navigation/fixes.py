@@ -61,10 +61,14 @@ def _changed(samples: Samples, last: Fix | None) -> list[Fix]:
     """The reported positions after `last` that differ from the one reported before them."""
     lat, lon = get(samples, "fix_lat"), get(samples, "fix_lon")
     out: list[Fix] = []
-    before = last
-    for t, a, o in zip(lat.t.tolist(), lat.v.tolist(), lon.v.tolist(), strict=True):
-        if before is None or (t > before.t and (a, o) != (before.lat, before.lon)):
-            before = Fix(t, a, o)
+    before, t, positions = last, lat.t, np.array([lat.v, lon.v])
+    if len(t) > 1 and (t[1:] > t[:-1]).all() and (last is None or t[0] > last.t):
+        # most repeat the line before: those that do are no news
+        news = np.flatnonzero(np.concatenate([[True], (positions[:, 1:] != positions[:, :-1]).any(axis=0)]))
+        t, positions = t[news], positions[:, news]
+    for at, a, o in zip(t.tolist(), *positions.tolist(), strict=True):
+        if before is None or (at > before.t and (a, o) != (before.lat, before.lon)):
+            before = Fix(at, a, o)
             out.append(before)
     return out
 
