@@ -574,8 +574,8 @@ class TestUpdate:
         usual, speed, *_ = TestOpened().explained()
         ways = [replace(usual, weight=1 - weight), replace(speed, weight=weight)]
         steps_of_flow = kalman._jump(JointParams().flow)
-        alone = kalman._mixed(state, ways[:1], steps_of_flow)
-        assert (kalman._mixed(state, ways, steps_of_flow).x.tolist() != alone.x.tolist()) is counts
+        alone, _ = kalman._mixed(state, ways[:1], steps_of_flow)
+        assert (kalman._mixed(state, ways, steps_of_flow)[0].tolist() != alone.tolist()) is counts
 
 
 class TestAlgorithmOfThePaper:
