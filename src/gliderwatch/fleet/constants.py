@@ -29,7 +29,9 @@ LONGEST_STAND = 60.0
 MEMORY = 120 * 3600.0
 """s in which what is known of the field fades (stand-in: best of 48 to 240 h)."""
 PROFILE_MEMORY = 30 * 86400.0
-"""s in which what is known of the mean profile fades: that of the season."""
+"""s in which the mean profile wanders by 1.4 usual deviations: that of the season. (Where it forgot in that
+time, and so wandered by its spread before any sample, it was unknown to 1 degree after two hours: NEES
+0.25.)"""
 FORGOTTEN = 15.0
 """Memories after which a field is forgotten: of its information 1e-13 is left, and more would overflow."""
 PAPER_VARIANCE = 0.001

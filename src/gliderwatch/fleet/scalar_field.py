@@ -188,7 +188,7 @@ def elapse(known: Information, dt: float, params: FieldParams) -> Information:
     if params.estimator == "literal":
         return predict(known, np.ones(params.size), PAPER_WALK * dt * variance)
     memory = np.full(params.size, MEMORY)
-    memory[GRID**3 :] = PROFILE_MEMORY
+    memory[GRID**3 :] = PROFILE_MEMORY * (params.spread / params.deviation) ** 2
     part = np.minimum(dt / memory, FORGOTTEN)
     return predict(known, np.exp(-part), variance * -np.expm1(-2 * part))
 
