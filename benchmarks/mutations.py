@@ -40,8 +40,8 @@ TESTS = {
     " unit/test_healthy_baseline unit/test_kinematic_speed unit/test_step_test unit/test_adaptive"
     " unit/test_verdict unit/test_kalman unit/test_glider_estimate",
     "layers": "unit/test_heuristics_layers unit/test_layers unit/test_layer_advice unit/test_casts",
-    "fleet": "unit/test_heuristics_fleet unit/test_fleet_flow unit/test_cross_check unit/test_fleet_field unit/test_fleet_advice"
-    " unit/test_fleet_batches unit/test_fleet_reference unit/test_exchange",
+    "fleet": "unit/test_heuristics_fleet unit/test_fleet_flow unit/test_cross_check unit/test_fleet_field"
+    " unit/test_fleet_advice unit/test_fleet_batches unit/test_fleet_reference unit/test_exchange",
     "forecast": "unit/test_heuristics_forecast unit/test_kalman_expected_flow unit/test_forecast_steering"
     " unit/test_forecast_surfacing unit/test_forecast_timing unit/test_forecast_waypoints"
     " property/test_forecast",
