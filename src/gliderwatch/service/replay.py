@@ -76,7 +76,9 @@ class Request:
 
     def compares(self, glider: str) -> bool:
         """Whether the dives of a glider are compared with those of its neighbours."""
-        return self.config is None or self.config.attention(glider).neighbours
+        if self.config is None or self.params(glider).reference == "fleet":
+            return True
+        return self.config.attention(glider).neighbours
 
 
 @dataclass(slots=True)
