@@ -186,13 +186,14 @@ def build_segment(
     window = (max(opened - _BEFORE, _EARLIEST), opened + _AFTER)
     quantities: dict[str, Series] = {}
     dropped, notes = {"bytes": damaged}, list[str]()
-    for rows in _GROUPS:
-        if rows[0].name in SCIENCE and not science:
-            continue
-        kept, lost, corrected = _clean(rows, samples, window)
-        quantities |= kept
-        dropped |= lost
-        notes += corrected
+    with np.errstate(all="ignore"):
+        for rows in _GROUPS:
+            if rows[0].name in SCIENCE and not science:
+                continue
+            kept, lost, corrected = _clean(rows, samples, window)
+            quantities |= kept
+            dropped |= lost
+            notes += corrected
     declination, source = declination_of(quantities)
     cycles = samples[TIME][0] if TIME in samples else np.empty(0)
     ends = [series.t[-1] for series in quantities.values()]
@@ -259,37 +260,41 @@ def _clean(
     if len(raw) < len(rows):
         return {}, {}, []
     t, columns = _together(raw)
-    with np.errstate(all="ignore"):
-        absent = reduce(or_, [v == row.absent for row, v in zip(rows, columns, strict=True)])
-        if rows[0].slocum_unit == _POSITION:  # what memory holds before the first fix: off Africa
-            absent |= reduce(and_, [v == 0.0 for v in columns])
-        values = [row.to_si(v) for row, v in zip(rows, columns, strict=True)]
-        good = _within(t, *window) & ~absent
-        values, far = _wrapped(rows, values)
-        for row, v in zip(rows, values, strict=True):
-            good &= _within(v, row.low, row.high)
+    good, absent = _within(t, *window), _absent(rows, columns)
+    if absent is not None:
+        good &= ~absent
+    values, far = [row.to_si(v) for row, v in zip(rows, columns, strict=True)], None
+    if rows[0].slocum_unit == _POSITION:
+        values, far = _wrapped(values)
+    for row, v in zip(rows, values, strict=True):
+        good &= _within(v, row.low, row.high)
     at = np.flatnonzero(good)
     if not (t[at[1:]] > t[at[:-1]]).all():
         at = at[np.unique(t[at], return_index=True)[1]]
     times = readonly(t[at])
-    wanted = len(times) + int(np.count_nonzero(absent))
+    wanted = len(times) + (0 if absent is None else int(np.count_nonzero(absent)))
     lost = {row.name: len(each[0]) - wanted for row, each in zip(rows, raw, strict=True)}
     if not len(times):
         return {}, lost, []
     kept = {row.name: Series(times, readonly(v[at])) for row, v in zip(rows, values, strict=True)}
-    n = int(np.count_nonzero(far & good))
+    n = 0 if far is None else int(np.count_nonzero(far & good))
     notes = [f"{n} values of {rows[-1].name} beyond 180 degrees brought back to -180 to 180"] if n else []
     return kept, lost, notes
 
 
-def _wrapped(rows: tuple[Quantity, ...], values: list[Array]) -> tuple[list[Array], NDArray[np.bool_]]:
-    """The values with longitudes of up to a turn brought back to -180 to 180, and where those were beyond.
+def _absent(rows: tuple[Quantity, ...], columns: list[Array]) -> NDArray[np.bool_] | None:
+    """Where there is what the glider writes that has no value; None where it writes nothing of the kind."""
+    found = [v == row.absent for row, v in zip(rows, columns, strict=True) if not math.isnan(row.absent)]
+    if rows[0].slocum_unit == _POSITION:  # what memory holds before the first fix: off Africa
+        found.append(reduce(and_, [v == 0.0 for v in columns]))
+    return reduce(or_, found) if found else None
+
+
+def _wrapped(values: list[Array]) -> tuple[list[Array], NDArray[np.bool_]]:
+    """Positions with longitudes of up to a turn brought back to -180 to 180, and where those were beyond.
 
     A glider counts on as it crosses the antimeridian.
     """
-    far = np.zeros(len(values[0]), dtype=np.bool_)
-    if rows[0].slocum_unit != _POSITION:
-        return values, far
     lat, lon = values
     far = (np.abs(lon) > 180.0) & (np.abs(lon) <= 360.0)
     return [lat, np.where(far, lon - np.copysign(360.0, lon), lon)], far
