@@ -83,8 +83,9 @@ class Series:
 
     def between(self, start: float, end: float) -> Series:
         """The samples with start <= t <= end."""
-        i, j = self.t.searchsorted(start, "left"), self.t.searchsorted(end, "right")
-        return Series(self.t[i:j], self.v[i:j])
+        t = self.t
+        i, j = t.searchsorted(start, "left"), t.searchsorted(end, "right")
+        return self if i == 0 and j == len(t) else Series(t[i:j], self.v[i:j])
 
 
 EMPTY = Series(readonly([]), readonly([]))

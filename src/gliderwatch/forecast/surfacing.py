@@ -96,7 +96,7 @@ def is_same(a: Place, b: Place) -> bool:
     >>> is_same((38.3892, -73.5), (38.389, -73.5)), is_same((38.38, -73.5), (38.389, -73.5))
     (True, False)
     """
-    return a == b or float(np.hypot(*displacement(*a, *b))) < SAME_WAYPOINT
+    return a == b or math.hypot(*displacement(*a, *b).tolist()) < SAME_WAYPOINT
 
 
 @lru_cache(maxsize=64)  # asked for four times a dive

@@ -7,6 +7,7 @@ of the two ends, so that displacements over a dive are right to better than a me
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 
@@ -28,6 +29,13 @@ def radii(lat: float | Array) -> tuple[Array, Array]:
     return meridian, parallel
 
 
+def _radii_of_point(lat: float) -> tuple[float, float]:
+    """`radii` at one latitude: an array of one number takes ten times as long."""
+    phi = math.radians(lat)
+    w2 = 1 - _ECCENTRICITY2 * math.sin(phi) ** 2
+    return _SEMI_MAJOR * (1 - _ECCENTRICITY2) / w2**1.5, _SEMI_MAJOR / math.sqrt(w2) * math.cos(phi)
+
+
 def to_plane(lat: float | Array, lon: float | Array, lat0: float, lon0: float) -> Array:
     """Metres east and north, shape (..., 2), of positions (degrees) seen from an origin (degrees).
 
@@ -45,7 +53,9 @@ def to_plane(lat: float | Array, lon: float | Array, lat0: float, lon0: float) -
 @lru_cache(maxsize=1024)
 def displacement(lat: float, lon: float, lat0: float, lon0: float) -> Array:
     """`to_plane` of one point, shape (2,), remembered: fixes and waypoints come again and again."""
-    return readonly(to_plane(lat, lon, lat0, lon0))
+    meridian, parallel = _radii_of_point((lat + lat0) / 2)
+    dlon = (lon - lon0 + 180.0) % 360.0 - 180.0
+    return readonly([parallel * math.radians(dlon), meridian * math.radians(lat - lat0)])
 
 
 def from_plane(x: Sequence[float] | Array, lat0: float, lon0: float) -> tuple[float, float]:
@@ -55,10 +65,10 @@ def from_plane(x: Sequence[float] | Array, lat0: float, lon0: float) -> tuple[fl
     >>> round(lat, 6), round(lon, 6)
     (38.5, -63.2)
     """
-    lat = lat0
+    lat, (east, north) = lat0, map(float, x)
     for _ in range(4):  # the radii depend on the latitude sought; this converges like 1e-3 a round
-        lat = lat0 + float(np.degrees(x[1] / radii((lat + lat0) / 2)[0]))
-    lon = lon0 + float(np.degrees(x[0] / radii((lat + lat0) / 2)[1]))
+        lat = lat0 + math.degrees(north / _radii_of_point((lat + lat0) / 2)[0])
+    lon = lon0 + math.degrees(east / _radii_of_point((lat + lat0) / 2)[1])
     return lat, (lon + 180.0) % 360.0 - 180.0
 
 

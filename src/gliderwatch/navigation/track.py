@@ -20,7 +20,7 @@ from gliderwatch.navigation.constants import (
     SPARSE,
 )
 from gliderwatch.navigation.flight import Flight, Samples, get
-from gliderwatch.navigation.geodesy import to_plane
+from gliderwatch.navigation.geodesy import displacement, to_plane
 
 
 def build_track(samples: Samples, flight: Flight, start: Fix, end: Fix) -> Track:
@@ -35,12 +35,13 @@ def build_track(samples: Samples, flight: Flight, start: Fix, end: Fix) -> Track
     shape = heading.t if measured else get(samples, "dr_lat").between(flight.start, flight.end).t
     inner = np.unique(np.concatenate([[flight.start, flight.end], heading.t, shape]))
     t = np.unique(np.concatenate([[start.t], inner[(inner > start.t) & (inner < end.t)], [end.t]]))
-    vectors = _headings(samples, t, flight, to_plane(end.lat, end.lon, start.lat, start.lon))
+    moved = displacement(end.lat, end.lon, start.lat, start.lon)
+    vectors = _headings(samples, t, flight, moved)
     reckoned = _onboard(samples, t, flight, start)
     if reckoned is None:
         steps = vectors * np.diff(t)[:, None] * _speed(samples, flight)
         reckoned = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
-    misfit = to_plane(end.lat, end.lon, start.lat, start.lon) - reckoned[-1]
+    misfit = moved - reckoned[-1]
     x = reckoned + misfit * ((t - start.t) / (end.t - start.t))[:, None]
     return Track(readonly(t), readonly(x), readonly(vectors))
 

@@ -206,14 +206,19 @@ def rotary_passage(gap: float, dive: float, a: Complex, q: Array) -> tuple[Compl
 def mean_passage(gap: float, dive: float, lat: float, q: Array, params: FlowParams) -> tuple[Array, float]:
     """The rows ((2, size)) of the matrix of `passage` that make the mean flow over the dive, and the variance
     (m2/s2) of its noise in a component."""
+    rows, variances = _mean_passage(gap, dive, lat, params)
+    return rows, float(q @ variances)
+
+
+@lru_cache(maxsize=64)  # a dive comes again when its current is corrected
+def _mean_passage(gap: float, dive: float, lat: float, params: FlowParams) -> tuple[Array, Array]:
+    """The rows, and the variance of the noise at unit intensity of each part ((parts,))."""
     a = rates(lat, params)
-    gained = q * _squared(a, gap)
     integral = _integral(a, dive)
     mean, (_, own) = integral / dive, _wandered(a, dive, _squared(a, dive), integral)
-    new = q * own / dive**2 + gained * np.abs(mean) ** 2
     row = np.zeros((1, params.parts + 1), dtype=np.complex128)
     row[0, :-1] = mean * np.exp(a * gap)
-    return _real(row), float(new.sum())
+    return readonly(_real(row)), readonly(own / dive**2 + _squared(a, gap) * np.abs(mean) ** 2)
 
 
 @cache
