@@ -240,3 +240,20 @@ def test_gas_density_is_pressure_by_kelvin() -> None:
         vacuum=series([25e3] * 3), vehicle_temperature=series([15.0] * 3), depth=series([9.0] * 3)
     )
     assert given["gas_density"].v == pytest.approx((101325.0 - 25e3) / 288.15)
+
+
+def test_readings_that_follow_each_other_are_never_more_alike_than_nine_tenths() -> None:
+    """Up for a quarter, down for a half, up again: their correlation is 0.95, and counts as 0.9."""
+    t, v = np.arange(80.0), np.repeat([1e4, -1e4, -1e4, 1e4], 20)
+    slope, sigma, _ = trend(t, v)
+    variance, spread = 80 * 1e8 / 78, 80 * (80**2 - 1) / 12
+    assert slope == pytest.approx(0.0, abs=1e-6)
+    assert sigma == pytest.approx((variance / spread * 1.9 / 0.1) ** 0.5, rel=1e-6)
+
+
+def test_a_reading_five_deviations_off_the_line_is_drawn_in() -> None:
+    """At three deviations: it has some six tenths of its weight, and so of the slope that it makes."""
+    t, v = np.arange(40.0), np.tile([1e4, -1e4], 20)
+    v[-1] = 7.5e4
+    part = trend(t, v)[0] / np.polyfit(t, v, 1)[0]
+    assert 0.5 < part < 0.75
