@@ -87,9 +87,9 @@ def check_alert(line: dict[str, Any]) -> None:
     [
         ("electa-2022", "electa", {"waiting": 1}),
         ("usf-sam-2019", "usf-sam", {}),
-        ("george-2024", "george", {}),
-        ("osu-2025", "osu684", {}),
-        ("maria-2022", "maria-997", {}),
+        pytest.param("george-2024", "george", {}, marks=pytest.mark.slow),
+        pytest.param("osu-2025", "osu684", {}, marks=pytest.mark.slow),
+        pytest.param("maria-2022", "maria-997", {}, marks=pytest.mark.slow),
     ],
 )
 def test_a_real_mission_replays_and_every_file_is_accounted_for(

@@ -121,7 +121,9 @@ def test_no_step_is_told(shared_data, name):
     assert all(v.info is None or v.info.proven is None for v in verdicts)
 
 
-@pytest.mark.parametrize(("part", "within", "wanted"), [(0.5, 2, 0.9), (0.3, 4, 0.9)])
+@pytest.mark.parametrize(
+    ("part", "within", "wanted"), [(0.5, 2, 0.9), pytest.param(0.3, 4, 0.9, marks=pytest.mark.slow)]
+)
 def test_drag_put_onto_any_dive_is_found(shared_data, part, within, wanted):
     """At all moments of all missions; missed at a change of the thruster, and where data are missing."""
     found = []

@@ -75,6 +75,7 @@ def test_without_a_folder_no_process_is_made(tmp_path: Path) -> None:
     writer.stop()
 
 
+@pytest.mark.slow
 def test_a_reader_never_sees_half_a_page_though_the_writer_is_killed(tmp_path: Path) -> None:
     path, chance = tmp_path / "index.html", random.Random(1)
     seen: set[str] = set()

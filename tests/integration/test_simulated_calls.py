@@ -26,7 +26,7 @@ def alerts_of(folder: Path, seed: int, rates: CallRates, days: float = 4.0) -> t
     return [a for a in store.alerts() if a.kind in TROUBLE], [call["fate"] for call in facts["calls"]]
 
 
-@pytest.mark.parametrize("cause", ["LEAK", "OVERDEPTH"])
+@pytest.mark.parametrize("cause", ["LEAK", pytest.param("OVERDEPTH", marks=pytest.mark.slow)])
 def test_abort_is_told_once_within_one_surfacing(tmp_path: Path, cause: str) -> None:
     words = {"LEAK": "leak", "OVERDEPTH": "too deep"}[cause]
     for seed in range(4):

@@ -272,7 +272,9 @@ def test_an_archive_that_is_taken_in_is_no_news(copied) -> None:
     assert live.unknown == []
 
 
-@pytest.mark.parametrize("spoil", [other_sensors, garbled, cut])
+@pytest.mark.parametrize(
+    "spoil", [cut, *(pytest.param(each, marks=pytest.mark.slow) for each in (other_sensors, garbled))]
+)
 def test_a_replay_says_what_was_said_live(copied, begun: Store, spoil: Callable[[Path], None]) -> None:
     folder, files = copied
     for path, _ in files[onset(files) :]:
