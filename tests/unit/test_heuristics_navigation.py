@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gliderwatch.model import Current, DiveFeatures, Fix, Unusable
+from gliderwatch.model import Current, DiveFeatures, Fix, SegmentId, Unusable
+from gliderwatch.navigation.clock import DAY, ROLLOVER, Stamp, corrections, forward_step, is_same
 from gliderwatch.navigation.dac import Report, new_reports, pair, updated
 from gliderwatch.navigation.dives import Navigation, extend, flight_notes, unsteered, why_unusable
 from gliderwatch.navigation.features import flight_features
-from gliderwatch.navigation.fixes import new_fixes
+from gliderwatch.navigation.fixes import new_fixes, zeroed
 from gliderwatch.navigation.flight import Flight, find_flight, lengthened, prepare
 from gliderwatch.navigation.geodesy import from_plane
 from gliderwatch.navigation.track import build_track, closure
@@ -322,3 +323,74 @@ class TestFeatures:
         two = [(0.0, 10.0), (100.0, 30.0), (200.0, 50.0), *((100.0 * k, 52.0 - 2.5 * k) for k in range(3, 9))]
         assert self.features(depth=one).depth_rate_dive is None
         assert self.features(depth=two).depth_rate_dive == pytest.approx(0.2)
+
+
+class TestClock:
+    def offset(self, gap: float) -> float:
+        """The correction (s) of a segment that opens `gap` s after the end of the one before."""
+        stamps = [Stamp(0, 0.0, 3 * H), Stamp(1, 3 * H + gap, 6 * H + gap)]
+        return corrections(stamps)[1].offset
+
+    def test_a_minute_of_overlap_is_no_step(self):
+        assert self.offset(-50.0) == 0.0 and self.offset(-70.0) > 0.0
+
+    def test_a_step_of_no_whole_hours_leaves_a_pause_of_a_minute(self):
+        assert self.offset(-2000.0) == 2060.0
+
+    @pytest.mark.parametrize(("pause", "step"), [(850.0, H), (950.0, H - 950.0 + 60.0)])
+    def test_a_step_in_hours_leaves_a_pause_of_a_quarter_at_most(self, pause, step):
+        assert self.offset(pause - H) == step
+
+    @pytest.mark.parametrize(("pause", "step"), [(3500.0, DAY), (3700.0, 23 * H)])
+    def test_a_step_in_days_leaves_one_of_an_hour_at_most(self, pause, step):
+        assert self.offset(pause - DAY) == step
+
+    @pytest.mark.parametrize(("silent", "is_rollover"), [(55 * DAY, True), (65 * DAY, False)])
+    def test_a_rollover_is_known_over_two_months_of_silence(self, silent, is_rollover):
+        assert (self.offset(silent - ROLLOVER) == ROLLOVER) == is_rollover
+
+    @pytest.mark.parametrize(("step", "found"), [(3500.0, 0.0), (3700.0, 3700.0)])
+    def test_a_clock_that_is_set_forward_by_less_than_an_hour_looks_like_a_long_call(self, step, found):
+        opened = 3 * H + 60.0 + step
+        fixes = Fix(3 * H - 10.0, LAT, LON), Fix(opened + 10.0, LAT, LON)
+        after = SegmentId(opened, "unit", "unit-2023-318-0-1")
+        assert forward_step("unit-2023-318-0-0", 3 * H, fixes[0], after, fixes[1]) == found
+
+    def longer(self, n: int, times: float) -> list[float]:
+        """The corrections of `n` segments, the second of which seems to last so many times as long."""
+        stamps = [Stamp(k, k * (3 * H + 200.0), k * (3 * H + 200.0) + 3 * H) for k in range(n)]
+        stamps[1] = replace(stamps[1], last_t=stamps[1].opened_at + times * 3 * H)
+        return [each.offset for each in corrections(stamps)]
+
+    def test_four_segments_say_how_long_one_may_be(self):
+        assert any(self.longer(3, 5.0)) and not any(self.longer(4, 5.0))
+
+    def test_one_of_twice_the_length_has_a_wild_end(self):
+        assert any(self.longer(5, 1.9)) and not any(self.longer(5, 2.1))
+
+    @pytest.mark.parametrize(("apart", "same"), [(110.0, True), (130.0, False)])
+    def test_files_of_one_name_that_open_two_minutes_apart_are_of_two_segments(self, apart, same):
+        a, b = (SegmentId(t, "unit", "unit-2023-318-0-1") for t in (0.0, apart))
+        assert is_same(a, b) == same
+
+
+class TestZero:
+    def shown(self, *depths: float, after: float = 0.0) -> float:
+        """What a depth sensor shows at the surface, by depths each second from so long `after` a fix on."""
+        samples = {"depth": series([(after + k, z) for k, z in enumerate(depths)])}
+        return zeroed(samples, [START], 0.0)[1]
+
+    def test_depths_within_half_a_minute_of_a_fix_are_of_the_surface(self):
+        assert self.shown(5, 5, 5, after=26.0) == 5.0 and self.shown(5, 5, 5, after=32.0) == 0.0
+
+    def test_less_than_2_m_is_the_sea(self):
+        assert self.shown(1.9, 1.9, 1.9) == 0.0 and self.shown(2.1, 2.1, 2.1) == pytest.approx(2.1)
+
+    def test_three_depths_say_it(self):
+        assert self.shown(5, 5) == 0.0 and self.shown(5, 5, 5) == 5.0
+
+    def test_more_than_15_m_is_an_old_fix(self):
+        assert self.shown(14, 14, 14) == 14.0 and self.shown(16, 16, 16) == 0.0
+
+    def test_a_quarter_of_the_depths_is_shallower(self):
+        assert self.shown(4, 5, 6, 7, 8) == 5.0
