@@ -67,3 +67,10 @@ def test_a_page_is_escaped_and_goes_across_the_date_line() -> None:
     assert "<script>alert" not in page
     assert ">180°W<" in page and ">179°W<" in page
     assert page.count('<circle class="next"') == 2
+
+
+def test_names_of_gliders_that_are_close_do_not_cover_each_other() -> None:
+    spots = tuple(Spot(f"sim-0{k}", 2.0, 1.5) for k in range(4))
+    drawn = svg(FieldPanel("t", "m", RAMP, (0.0, 4.0), (0.0, 3.0), spots=spots), world())
+    places = re.findall(r'<text[^>]*x="([\d.]+)" y="([\d.]+)"[^>]*>sim-0', drawn)
+    assert len(places) == len(set(places)) == 4

@@ -20,6 +20,8 @@ WIDTH = 340.0
 LEFT, RIGHT, TOP, BOTTOM = 44.0, 10.0, 24.0, 20.0
 TALLEST, LOWEST = 1.2, 0.5
 """Of the values, as parts of their width."""
+LETTER, LINE = 6.5, 12.0
+"""Width of a letter of a name, and height of a line, in units of the picture."""
 STYLE = """\
 .field{width:100%;background:var(--card);border-radius:6px;font:11px system-ui,sans-serif}
 .field text{fill:var(--ink)}.field .land{fill:var(--land);stroke:var(--shore);stroke-width:.8}
@@ -140,11 +142,31 @@ def _spots(frame: _Frame) -> Iterator[str]:
             for kind in ("ring", "next"):
                 yield f'<circle class="{kind}" cx="{u:.1f}" cy="{v:.1f}" r="5"/>'
         yield f'<circle class="glider" cx="{x:.1f}" cy="{y:.1f}" r="4"/>'
+    yield from _names(frame)
+
+
+def _names(frame: _Frame) -> Iterator[str]:
+    """The names of the gliders: beside their dots, or a line above or below where another's is there."""
+    placed = list[tuple[float, float]]()
     for spot in frame.panel.spots:
-        x, y = frame.x(spot.x), frame.y(spot.y)
+        x, y = frame.x(spot.x), max(frame.y(spot.y) + 4, TOP + 9)
         is_right = x < WIDTH * 0.7 and (spot.to is None or spot.to[0] <= spot.x or x < WIDTH * 0.3)
-        side, anchor = (7, "start") if is_right else (-7, "end")
-        yield text(x + side, max(y + 4, TOP + 9), spot.name, anchor, "name")
+        long = LETTER * len(spot.name)
+        sides = [(x + 7, "start", x + 7 + long / 2), (x - 7, "end", x - 7 - long / 2)]
+        tried = [
+            (at, anchor, middle, y + off)
+            for off in (0.0, LINE, -LINE)
+            for at, anchor, middle in (sides if is_right else sides[::-1])
+        ]
+        free = (
+            each
+            for each in tried
+            if abs(each[2] - WIDTH / 2) + long / 2 < WIDTH / 2
+            and all(abs(each[2] - u) > long or abs(each[3] - v) >= LINE for u, v in placed)
+        )
+        at, anchor, middle, line = next(free, tried[0])
+        placed.append((middle, line))
+        yield text(at, line, spot.name, anchor, "name")
 
 
 def _axes(frame: _Frame, whole: float) -> Iterator[str]:
