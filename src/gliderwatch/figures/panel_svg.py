@@ -133,7 +133,7 @@ def _axes(panel: Panel, scale: _Scale) -> Iterator[str]:
     for t, label in times(scale.start, scale.end):
         x = float(scale.x(t))
         yield f'<path class="grid" d="M{x:.1f} {TOP:g}V{bottom:g}"/>'
-        if scale.left - 2 <= x <= WIDTH - RIGHT - 34:  # the name of the axis stands at its end
+        if scale.left - 2 <= x <= WIDTH - RIGHT - 24 - CHAR * len(label) / 2:  # `UTC` stands at the end
             yield text(x, HEIGHT - 6, label, "middle")
     yield text(WIDTH - RIGHT, HEIGHT - 6, "UTC", "end", "faint")
     yield text(2, 11, panel.unit, "start", "faint")
@@ -156,10 +156,13 @@ def _legend(panel: Panel) -> Iterator[str]:
         entries.append(("normal", '<path class="band" d="M0-5h14v10H0z"/>'))
     if len(entries) < 2:
         return
-    x = 2.0
+    x, y = 2.0, 22
     for label, mark in entries:
-        yield f'<g transform="translate({x:.0f} 22)">{mark}{text(18, 4, label, "start")}</g>'
-        x += 24 + CHAR * len(label)
+        width = 26 + CHAR * len(label)
+        if x + width > WIDTH + 6 and y == 22:  # the rest stands beside the name of the axis
+            x, y = 14 + CHAR * len(panel.unit), 8
+        yield f'<g transform="translate({x:.0f} {y})">{mark}{text(18, 4, label, "start")}</g>'
+        x += width
 
 
 def text(x: float, y: float, label: str, anchor: str, kind: str = "") -> str:
