@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from gliderwatch.errors import Quarantine, Retry
 from gliderwatch.model import Aborts, Happened, Happening
 from gliderwatch.slocum import calls, logs
-from gliderwatch.slocum.calls import Dialog, begun, heard, read_log, split
+from gliderwatch.slocum.calls import Dialog, begun, read_log, split, with_line
 from gliderwatch.slocum.folders import is_log
 from gliderwatch.slocum.logs import parse_line
 
@@ -188,27 +188,27 @@ def test_garbled_lines_are_read_without_an_error(data: st.DataObject) -> None:
     garbled = one[:cut].encode(encoding) + noise + other.encode(encoding)
     for event in parse_line(garbled):
         assert isinstance(event, logs.Event)
-    heard(begun(NAME), garbled)
+    with_line(begun(NAME), garbled)
 
 
 @given(st.lists(st.integers(0, 900), max_size=6), st.sampled_from(["\n", "\r\n", "\r"]))
 def test_log_that_grows_tells_the_same_as_the_whole(cuts: list[int], end: str) -> None:
     data = (STATUS + ABORT + "GliderDos A 8 >").replace("\n", end).encode()
-    whole, _ = _told(data, [])
-    assert _told(data, cuts)[0].call == whole.call
+    whole, _ = _with_event(data, [])
+    assert _with_event(data, cuts)[0].call == whole.call
     assert whole.call.aborts[-1] == Aborts(1, T0, "LEAK", 1737869225.0)
     assert [h.what for h in whole.call.happened] == [Happening.GLIDER_DOS]
 
 
-def _told(data: bytes, cuts: list[int]) -> tuple[Dialog, bytes]:
+def _with_event(data: bytes, cuts: list[int]) -> tuple[Dialog, bytes]:
     """As `read_log` does with the file as it grows: from each whole line on."""
     dialog, rest = begun(NAME), b""
     edges = [0, *sorted(min(c, len(data)) for c in cuts), len(data)]
     for a, b in pairwise(edges):
         lines, rest = split(rest + data[a:b])
         for line in lines:
-            dialog = heard(dialog, line)
-    return heard(dialog, rest), rest
+            dialog = with_line(dialog, line)
+    return with_line(dialog, rest), rest
 
 
 def test_file_is_read_on_from_where_it_ended(tmp_path: Path) -> None:
@@ -333,9 +333,9 @@ def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
 def test_what_is_kept_of_a_log_is_bounded() -> None:
     dialog = begun(NAME)
     for k in range(500):
-        dialog = heard(dialog, f"zModem transfer DONE for file {k:08d}.scd".encode())
-        dialog = heard(dialog, f"Vehicle Name: g{k}".encode())
-        dialog = heard(dialog, f"1 behavior x: abort_the_mission(1): (8)MS_ABORT_A{k}".encode())
-        dialog = heard(dialog, f"ABORT HISTORY: total since reset: {k}".encode())
+        dialog = with_line(dialog, f"zModem transfer DONE for file {k:08d}.scd".encode())
+        dialog = with_line(dialog, f"Vehicle Name: g{k}".encode())
+        dialog = with_line(dialog, f"1 behavior x: abort_the_mission(1): (8)MS_ABORT_A{k}".encode())
+        dialog = with_line(dialog, f"ABORT HISTORY: total since reset: {k}".encode())
     call = dialog.call
     assert {len(call.sent), len(dialog.names), len(call.happened), len(call.aborts)} == {calls._MOST}

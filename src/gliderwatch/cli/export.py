@@ -219,9 +219,9 @@ def where(
         return
     for view, area in found:
         if area is None:
-            heard = f"; last heard {utc(view.last_sign)}" if view.last_sign is not None else ""
-            fix = f", at {place(view.fix.lat, view.fix.lon)}" if heard and view.fix is not None else ""
-            click.echo(f"{clean(view.name)}: no position is known now{heard}{fix}")
+            sign = f"; last heard {utc(view.last_sign)}" if view.last_sign is not None else ""
+            fix = f", at {place(view.fix.lat, view.fix.lon)}" if sign and view.fix is not None else ""
+            click.echo(f"{clean(view.name)}: no position is known now{sign}{fix}")
         elif ais is not None:
             click.echo("\n".join(virtual.lines(view.name, area, ais, view.now)))
         else:

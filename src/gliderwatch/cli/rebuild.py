@@ -198,11 +198,11 @@ def _alone(path: Path, keep: bool) -> Iterator[None]:
             f"the service uses the state file {path}. What to do: systemctl stop gliderwatch, "
             "this command once more, systemctl start gliderwatch"
         )
-    life = PidLock(path)
+    lock = PidLock(path)
     try:
         yield
     finally:
-        life.end()
+        lock.end()
 
 
 def _fill(work: _Work, paths: Sequence[str], held: Sequence[SegmentId], on_step: Progress) -> None:

@@ -228,5 +228,5 @@ def _with_currents(state: Estimate, dive: Dive, params: GliderParams, flag: int 
     assert dive.start is not None and dive.end is not None
     error = REPORTED if current.final else PROVISIONAL
     flow = np.array([current.u, current.v])
-    known = currents.learn(state.currents, dive.start, dive.end, flow, error)
-    return replace(state, currents=known)
+    learnt = currents.learn(state.currents, dive.start, dive.end, flow, error)
+    return replace(state, currents=learnt)

@@ -130,9 +130,9 @@ def compare(baseline: Baseline, features: DiveFeatures) -> Mapping[str, Usual]:
     out = {}
     for quantity, value, column in zip(QUANTITIES, row.tolist(), columns, strict=False):
         if isfinite(value):
-            told = [isfinite(each) for each in column]
-            alike = list(compress(same[quantity.given], told))
-            usual = _usual(list(compress(column, told)), alike, quantity)
+            measured = [isfinite(each) for each in column]
+            alike = list(compress(same[quantity.given], measured))
+            usual = _usual(list(compress(column, measured)), alike, quantity)
             if usual is not None:
                 out[quantity.name] = Usual(value, *usual)
     return MappingProxyType(out)

@@ -229,12 +229,12 @@ def step(
     ``frozen``: an incident is open, so that nothing is learnt of what is normal.
     """
     at = setting(dive.features)
-    known = speed_range(state.normal, at, params.learning or RangeParams())
-    learnt = known if params.learning else None
+    of_dives = speed_range(state.normal, at, params.learning or RangeParams())
+    learnt = of_dives if params.learning else None
     normal = learnt or SpeedRange(params.low, (params.low + params.high) / 2, params.high, 0)
     roll = _roll_step(state, dive)
     rolled = state.rolled + 1 if roll > ROLL_STEP else 0
-    usual = known.usual if known else None  # whatever the bounds are: a speed means one thing
+    usual = of_dives.usual if of_dives else None  # whatever the bounds are: a speed means one thing
     # the first of two dives may have been half over when it happened
     hint = (LOST if roll > ROLL_LOST else ROLLED) if 1 <= rolled <= 2 else None
     kinematic = kinematic_speed(state.ratios, dive.features)

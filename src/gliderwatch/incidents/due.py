@@ -30,7 +30,7 @@ from gliderwatch.model import Call, Fix
 from gliderwatch.params import Attention
 
 
-class GliderFacts(IncidentFacts, SilenceFacts, WatchFacts, Protocol):
+class NoticeFacts(IncidentFacts, SilenceFacts, WatchFacts, Protocol):
     """All facts of a glider that notices follow from."""
 
     def irregularities(self, now: float) -> list[Irregularity]:
@@ -76,7 +76,7 @@ class Due:
     open_threads: frozenset[str]
 
 
-def due(before: NotificationState, facts: GliderFacts, wanted: Wanted, findings: Findings, now: float) -> Due:
+def due(before: NotificationState, facts: NoticeFacts, wanted: Wanted, findings: Findings, now: float) -> Due:
     """The notices that are due of a glider at `now` (s), in the order in which they are sent."""
     acks, hours = wanted.acks, wanted.reminder_hours
     silences, of_silences = overdue.on_calls(before.silences, facts, now)
@@ -112,7 +112,7 @@ def due(before: NotificationState, facts: GliderFacts, wanted: Wanted, findings:
 
 
 def _of_fleet(
-    notified: NotificationState, facts: GliderFacts, currents: Sequence[DiveCurrent] | None
+    notified: NotificationState, facts: NoticeFacts, currents: Sequence[DiveCurrent] | None
 ) -> tuple[NotificationState, list[Notice]]:
     """A glider beside its neighbours."""
     last = None if currents is None else facts.last_surfacing(inf)
@@ -128,7 +128,7 @@ def _of_fleet(
 
 
 def _of_calls(
-    notified: NotificationState, facts: GliderFacts, wanted: Wanted, now: float
+    notified: NotificationState, facts: NoticeFacts, wanted: Wanted, now: float
 ) -> tuple[NotificationState, list[Notice]]:
     """What a glider reported in its calls, and that it calls and sends no file."""
     recent = facts.calls(now - GONE)
@@ -142,7 +142,7 @@ def _of_calls(
 
 def _of_health(
     notified: NotificationState,
-    facts: GliderFacts,
+    facts: NoticeFacts,
     wanted: Wanted,
     rows: Sequence[tuple[float, Judged]],
     now: float,

@@ -360,17 +360,17 @@ def _follow(job: Job, advice: Path) -> None:
     for scenario in job.scenarios:  # the folders have to be there for the service to watch them
         (job.dockserver / scenario.glider / "from-glider").mkdir(parents=True, exist_ok=True)
     form = FileForm(Names.LONG, job.compressed, generation=job.scenarios[0].generation)
-    heard = [0, 0]
+    answers = [0, 0]
     asked = by_files(job.dockserver, job.out / "cache", advice, form, PATIENCE)
 
     def answer(sent: Mission) -> Point | None:
         waypoint = asked(sent)
-        heard[waypoint is None] += 1
+        answers[waypoint is None] += 1
         return waypoint
 
     fleet = {each.glider: each for each in fly(job.scenarios, answer)}
     write_truth(job.out, [each.mission() for each in fleet.values()])
-    print(f"{len(fleet)} gliders came up {sum(heard)} times and followed {heard[0]} pieces of advice")
+    print(f"{len(fleet)} gliders came up {sum(answers)} times and followed {answers[0]} pieces of advice")
 
 
 def _fly(job: Job, progress: Progress) -> list[Mission]:

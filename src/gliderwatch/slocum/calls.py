@@ -93,9 +93,9 @@ def _read(file: BinaryIO, dialog: Dialog) -> Dialog:
         offset += len(piece)
         lines, rest = split(rest + piece)
         for line in lines:
-            dialog = heard(dialog, line)
+            dialog = with_line(dialog, line)
     if _PROMPT.search(rest):
-        return replace(heard(dialog, rest), offset=offset)
+        return replace(with_line(dialog, rest), offset=offset)
     return replace(dialog, offset=offset - len(rest))
 
 
@@ -107,7 +107,7 @@ def split(data: bytes) -> tuple[list[bytes], bytes]:
     return lines, rest
 
 
-def heard(dialog: Dialog, line: bytes) -> Dialog:
+def with_line(dialog: Dialog, line: bytes) -> Dialog:
     """The dialog after one more line."""
     for event in parse_line(line):
         dialog = after(dialog, event)
@@ -127,10 +127,10 @@ def after(dialog: Dialog, event: Event) -> Dialog:
             return _named(dialog, event.name)
         case events.PilotThere():
             return replace(dialog, by_pilot=dialog.by_pilot or event.ends)
-    return replace(dialog, call=_told(dialog.call, event, dialog.t))
+    return replace(dialog, call=_with_event(dialog.call, event, dialog.t))
 
 
-def _told(call: Call, event: Event, t: float) -> Call:
+def _with_event(call: Call, event: Event, t: float) -> Call:
     """The call after an event at a time (s)."""
     match event:
         case events.Position():

@@ -416,7 +416,7 @@ def application(
     """The application for a configuration. Raises GliderwatchError where its key cannot be had."""
 
     @asynccontextmanager
-    async def life(app: Starlette) -> AsyncIterator[None]:
+    async def lifespan(app: Starlette) -> AsyncIterator[None]:
         app.state.site = Site(config, acknowledge_incident, mute_glider, draw)
         looking = asyncio.create_task(app.state.site.look())
         yield
@@ -437,7 +437,7 @@ def application(
         ],
         middleware=[Middleware(Headers), Middleware(TrustedHostMiddleware, allowed_hosts=hosts(config))],
         exception_handlers={HTTPException: problem, GliderwatchError: problem, Exception: problem},
-        lifespan=life,
+        lifespan=lifespan,
     )
 
 

@@ -177,7 +177,7 @@ class PageCache:
             return page
         making = self._making.get(file)
         if making is None:
-            making = self._making[file] = asyncio.ensure_future(self._anew(file, self._clock()))
+            making = self._making[file] = asyncio.ensure_future(self._made_again(file, self._clock()))
             making.add_done_callback(lambda _: self._making.pop(file))
         return await asyncio.shield(making)
 
@@ -193,10 +193,10 @@ class PageCache:
             if held.mark != self._mark(file) or now - held.made >= self._keep(file)
         ]
         for file in late:
-            await self._anew(file, self._held[file].asked)
+            await self._made_again(file, self._held[file].asked)
         return bool(late)
 
-    async def _anew(self, file: str, asked: float) -> LivePage:
+    async def _made_again(self, file: str, asked: float) -> LivePage:
         mark = self._mark(file)  # before it is made: news that come meanwhile have it made again
         page = await self._make(file)
         held = self._held.get(file)
