@@ -593,3 +593,38 @@ class TestAlgorithmOfThePaper:
         found = SimpleNamespace(flow=np.zeros(2), flow_cov=np.eye(2) * 0.75)
         other = Reference(Current(sigmas, 0.0, final=True), np.eye(2) * 0.25)
         assert glider._apart(found, other) == apart
+
+
+class TestSureness:
+    @pytest.mark.parametrize(("sigma", "blamed"), [(0.0291, Blame.CURRENT), (0.0330, Blame.UNCLEAR)])
+    def test_a_current_is_blamed_where_a_turn_of_the_compass_fits_worse_by_six(self, sigma, blamed):
+        """Of these two the chi-squares are 9 and 0 with one more number, and 7 and 0."""
+        row = []
+        for angle in np.radians([0.0, 47.0, 0.0, 47.0]):
+            aside = np.array([-math.sin(angle), math.cos(angle)])
+            row.append(Misfit(0.25, float(aside @ [-0.25, 0.3]), sigma, float(angle)))
+        assert blame(tuple(row), gate=4.0, least=0.05) is blamed
+
+    @pytest.mark.parametrize(("below", "is_slow"), [(0.60, False), (0.75, True)])
+    def test_a_second_dive_that_rolls_is_slow_from_two_thirds_of_a_standard_error_on(self, below, is_slow):
+        estimate = SimpleNamespace(speed=0.2 - 0.01 * below, own_speed=0.25, own_sigma=0.01, sigma=0.02)
+        seen = SimpleNamespace(is_free=False, unseen=0.0, slip=1.0, start=0.0, end=600.0)
+        info = SimpleNamespace(
+            estimate=estimate, seen=seen, single_sigma=0.01, kinematic_fits=False, proven=None, causes={}
+        )
+        normal = SpeedRange(0.2, 0.25, 0.3, 20)
+        params = speed_params(GliderParams())
+        _, flag, _ = verdict._slow_or_fast(SpeedState(rolled=2), info, None, normal, params)
+        assert (flag is Flag.ANOMALY) == is_slow
+
+    @pytest.mark.parametrize(("sigma", "learns"), [(0.036, True), (0.039, False)])
+    def test_a_dive_whose_own_speed_is_sure_to_15_percent_tells_the_ratio_to_what_is_reported(
+        self, sigma, learns
+    ):
+        flown = SimpleNamespace(
+            features=DiveFeatures(duration=3 * HOUR, onboard_speed=0.25, surfacing_unseen=True)
+        )
+        seen = SimpleNamespace(is_free=False, own_speed=lambda: (0.25, sigma))
+        info = SimpleNamespace(seen=seen, proven=None)
+        after = verdict._learnt(SpeedState(), flown, info, 0.0, speed_params(GliderParams()))
+        assert bool(after.ratios.onboard) == learns
