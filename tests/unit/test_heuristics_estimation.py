@@ -39,6 +39,8 @@ from gliderwatch.estimation.verdict import (
     step,
 )
 from gliderwatch.model import Current, Dive, DiveFeatures, Fix, Flag, readonly
+from gliderwatch.navigation.geodesy import from_plane
+from gliderwatch.papers.learner import init
 from gliderwatch.params import GliderParams
 from gliderwatch.sea.ocean_field import Field
 from joint_support import HOUR, Way, dive, mission
@@ -628,3 +630,13 @@ class TestSureness:
         info = SimpleNamespace(seen=seen, proven=None)
         after = verdict._learnt(SpeedState(), flown, info, 0.0, speed_params(GliderParams()))
         assert bool(after.ratios.onboard) == learns
+
+
+@pytest.mark.parametrize(("widths", "is_kept"), [(5.5, True), (6.5, False)])
+def test_a_function_six_widths_behind_is_let_go(widths, is_kept):
+    params = GliderParams()
+    centre = from_plane((1000.0, widths * params.learner.sigma), 36.0, -70.0)
+    state = SimpleNamespace(learner=init(0.3, 1), centres=readonly(np.array([centre])))
+    track = SimpleNamespace(x=np.array([[0.0, 0.0], [1000.0, 0.0]]))
+    _, centres, _ = adaptive._covering(state, track, Fix(0.0, 36.0, -70.0), params)
+    assert bool((np.abs(centres - centre).max(axis=1) < 1e-9).any()) == is_kept
