@@ -370,7 +370,11 @@ def main() -> None:
         with folder() as where:
             recipients = {"pilot": {"channels": ["mail"], "surfacing": names}}
             url = f"mailto://127.0.0.1:{PORT}?from=gliderwatch@a.org&to=pilot@b.org"
-            config = configure(where, names, channels={"mail": {"url": url}}, recipients=recipients)
+            # copies of four gliders would all be neighbours in one place: `fleet_cost.py` measures that
+            usual = {"normal_speed": {"min": 0.2, "max": 0.4}, "neighbours": False}
+            config = configure(
+                where, names, channels={"mail": {"url": url}}, recipients=recipients, defaults=usual
+            )
             fleet.caches(where / "cache")
             paths = [
                 put(where / "gliders", file)
