@@ -217,6 +217,9 @@ RECENT = 8
 """Newest segments of a glider that all keep their checkpoint: before them comes most of what comes late."""
 LATELY, CLOSE = 64, 4
 """Of so many newest one in so many does."""
+IN_MEMORY = 64
+"""Gliders of which the newest state is also kept in memory, some 0.1 MB each: to read it takes as long as to
+assess a dive."""
 SPARSE = 16
 """Of the older ones one in this many does. Its name decides, so that no order of arrival matters."""
 
@@ -246,6 +249,8 @@ class Segments:
     def __init__(self, connection: sqlite3.Connection) -> None:
         self._db = connection
         self.ahead, self.following = CheckpointCache(), 0
+        self._latest: dict[str, tuple[SegmentId, GliderState]] = {}
+        """Of some gliders the state after their newest segment, as its checkpoint has it."""
         self.clocks = MissionClocks(connection)
         self._revisions: dict[str, int] = {}
         self._changed: set[str] = set()
@@ -262,6 +267,8 @@ class Segments:
         """It is not."""
         self.ahead.rollback()
         self.clocks.rollback()
+        for glider in self._changed:
+            self._latest.pop(glider, None)
         self._changed.clear()
 
     def changed(self, glider: str) -> None:
@@ -378,6 +385,8 @@ class Segments:
             return GliderState()
         if (ahead := self.ahead.of(identity)) is not None:
             return ahead
+        if (latest := self._in_memory(identity)) is not None:
+            return latest
         data = self._checkpoint(identity)
         if data is None:
             raise KeyError(identity.name)
@@ -420,6 +429,7 @@ class Segments:
             (first.glider, first.opened_at, first.name),
         )
         self.ahead.drop(first.glider)
+        self._latest.pop(first.glider, None)
         self._changed.add(first.glider)
 
     def behind(self, glider: str) -> SegmentId | None:
@@ -439,10 +449,21 @@ class Segments:
         newest = self.last_before(glider, float("inf"))
         if newest is None:
             return None
-        if (ahead := self.ahead.of(newest)) is not None:
-            return ahead
+        if (state := self.ahead.of(newest) or self._in_memory(newest)) is not None:
+            return state
         data = self._checkpoint(newest)
         return None if data is None else codec.decode(data, GliderState)
+
+    def _in_memory(self, identity: SegmentId) -> GliderState | None:
+        """The state after a segment, where it is in memory and the state file still has it."""
+        held = self._latest.get(identity.glider)
+        if held is None or held[0] != identity:
+            return None
+        row = self._db.execute(  # the record itself is not read
+            "SELECT checkpoint IS NULL FROM segments WHERE glider = ? AND opened_at = ? AND name = ?",
+            (identity.glider, identity.opened_at, identity.name),
+        ).fetchone()
+        return None if row is None or row[0] else held[1]
 
     def _checkpoint(self, identity: SegmentId) -> bytes | None:
         data: bytes | None = self._db.execute(
@@ -487,10 +508,14 @@ class Segments:
         key = (identity.glider, identity.opened_at, identity.name)
         record = state if isinstance(state, bytes) else None
         if isinstance(state, GliderState):
+            self._latest.pop(identity.glider, None)
             if self.following:
                 self.ahead.keep(identity, state)
             else:
                 self.ahead.drop(identity.glider)
+                self._latest[identity.glider] = identity, state
+                if len(self._latest) > IN_MEMORY:
+                    self._latest.pop(next(iter(self._latest)))
             record = codec.encode_state(state) if self.is_kept(identity.name, self.following) else None
         self._db.execute(
             "UPDATE segments SET checkpoint = ?1 WHERE glider = ?2 AND opened_at = ?3 AND name = ?4 "
