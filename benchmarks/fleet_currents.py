@@ -236,9 +236,8 @@ def fault_table(jobs: list[Job], workers: int) -> tuple[list[Result], list[str]]
         hours = [r.told for r in same if r.told is not None]
         median = f"{np.median(hours):8.0f}" if hours else "       -"
         false, months = sum(len(r.false) for r in same), sum(r.months for r in same)
-        lines.append(
-            f"{fault:6}  {n:7d}  {len(same):6d}  {len(hours):12d}  {median}  {false:5d}  {months:13.1f}"
-        )
+        rest = "      -              -" if same[0].job.first_only else f"{false:5d}  {months:13.1f}"
+        lines.append(f"{fault:6}  {n:7d}  {len(same):6d}  {len(hours):12d}  {median}  {rest}")
     return results, lines
 
 

@@ -1,7 +1,8 @@
 """The experiment of paper 003: a fleet maps the temperature of a box of the sea, and decides where to look.
 
     python benchmarks/fleet_field.py [--gliders 1 5 10 15 20] [--hours 1 2 3] [--days 7] [--seeds 1]
-        [--methods pooled consensus literal] [--workers 2] [--figure field.png] [--json field.json]
+        [--methods pooled consensus literal] [--rates 180 360] [--workers 2] [--figure field.png]
+        [--json field.json]
 
 Gliders fly at 0.6 m/s and a pitch of 26 degrees, up and down through a box of 60 x 60 km and 100 m, and come
 up after a time that is uniform about `hours`, 15 min more or less. The sea is
@@ -37,7 +38,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the workers are the thread
 import numpy as np
 from common import machine
 
+from gliderwatch.fleet import scalar_field
 from gliderwatch.fleet.advice import gradient
+from gliderwatch.fleet.constants import INFORMATION_RATE
 from gliderwatch.fleet.scalar_field import (
     BIN,
     Batch,
@@ -68,14 +71,15 @@ SETTLED = 24.0
 
 @dataclass(frozen=True)
 class Cell:
-    """One experiment: a fleet, how often it comes up (h), for how many days, who puts it together, and
-    chance."""
+    """One experiment: a fleet, how often it comes up (h), for how many days, who puts it together, chance,
+    and what samples count (`INFORMATION_RATE`)."""
 
     gliders: int
     hours: float
     days: int
     method: str
     seed: int
+    rate: float = INFORMATION_RATE
 
 
 @dataclass(frozen=True)
@@ -158,6 +162,7 @@ class Nodes:
 
 def experiment(cell: Cell) -> Result:
     """Fly one experiment."""
+    scalar_field.INFORMATION_RATE = cell.rate  # this process is of the benchmark alone
     params = FieldParams("literal") if cell.method == "literal" else FieldParams()
     field = Pooled(params) if cell.method == "pooled" else Nodes(params)
     rng = np.random.default_rng([cell.seed, cell.gliders])
@@ -195,17 +200,17 @@ def _reflected(place: Array) -> Array:
 
 def table(results: Sequence[Result]) -> Iterator[str]:
     """Lines of a table, a mean over seeds each."""
-    yield "method     gliders  hours  error 24 h   at the end   24 h on    NEES 24 h on"
+    yield "method     gliders  hours  rate  error 24 h   at the end   24 h on    NEES 24 h on"
 
-    def of(r: Result) -> tuple[str, int, float]:
-        return r.cell.method, r.cell.gliders, r.cell.hours
+    def of(r: Result) -> tuple[str, int, float, float]:
+        return r.cell.method, r.cell.gliders, r.cell.hours, r.cell.rate
 
-    for method, gliders, hours in dict.fromkeys(map(of, results)):
-        same = [r for r in results if of(r) == (method, gliders, hours)]
+    for method, gliders, hours, rate in dict.fromkeys(map(of, results)):
+        same = [r for r in results if of(r) == (method, gliders, hours, rate)]
         day = mean(r.error[r.t.index(SETTLED)] for r in same)
         end, (late, nees) = mean(r.error[-1] for r in same), np.mean([r.settled for r in same], axis=0)
-        line = f"{method:9}  {gliders:7d}  {hours:5.1f}  {day:10.3f}  {end:11.3f}  {late:8.3f}  {nees:13.2f}"
-        yield line
+        of_cell = f"{method:9}  {gliders:7d}  {hours:5.1f}  {rate:4.0f}"
+        yield f"{of_cell}  {day:10.3f}  {end:11.3f}  {late:8.3f}  {nees:13.2f}"
 
 
 def draw(results: Sequence[Result], path: Path) -> None:
@@ -242,14 +247,15 @@ def main() -> None:
     parser.add_argument("--days", type=int, default=7)
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS))
+    parser.add_argument("--rates", type=float, nargs="+", default=[INFORMATION_RATE])
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--figure", type=Path)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     cells = [
-        Cell(n, hours, options.days, method, seed)
-        for method, hours, n, seed in product(
-            options.methods, options.hours, options.gliders, range(options.seeds)
+        Cell(n, hours, options.days, method, seed, rate)
+        for method, hours, n, seed, rate in product(
+            options.methods, options.hours, options.gliders, range(options.seeds), options.rates
         )
     ]
     print(machine())
