@@ -376,6 +376,29 @@ class Assessment:
     parameters: str
     unusable: Unusable | None = None
 
+    # Numbers of the evidence that decide something: a name that is wrong must not be a missing number.
+
+    @property
+    def speed_sigma(self) -> float | None:
+        """Standard error of the speed (m/s)."""
+        return self.evidence.get("speed_sigma")
+
+    @property
+    def usual_speed(self) -> float | None:
+        """The glider's usual speed (m/s), once it is learnt."""
+        return self.evidence.get("usual_speed")
+
+    @property
+    def usual_before(self) -> float | None:
+        """The usual speed (m/s) before the new way of flying that begins with this dive."""
+        return self.evidence.get("usual_before")
+
+    @property
+    def rolls(self) -> bool:
+        """Whether the dive rolls otherwise than usual; not while either is unknown."""
+        roll, low, high = map(self.evidence.get, ("roll_mean", "roll_mean_low", "roll_mean_high"))
+        return roll is not None and low is not None and high is not None and not low <= roll <= high
+
 
 @dataclass(frozen=True, slots=True)
 class NextSurfacing:

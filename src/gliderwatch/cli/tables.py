@@ -72,7 +72,7 @@ def dives(assessments: Sequence[Assessment], *, whole: bool = False) -> Table:
             _number(a.evidence.get("duration_h"), ".1f"),
             flag(a),
             _number(a.speed),
-            _number(a.evidence.get("speed_sigma")),
+            _number(a.speed_sigma),
             _number(a.evidence.get("along_speed")),
             _vector(a.flow_u, a.flow_v),
             _vector(a.reference_u, a.reference_v),

@@ -72,7 +72,7 @@ def _dive(d: Assessment) -> dict[str, Any]:
         "t_surface": iso(d.t_surface),
         "flag": d.flag,
         "speed": d.speed,
-        "speed_sigma": d.evidence.get("speed_sigma"),
+        "speed_sigma": d.speed_sigma,
         "flow_u": d.flow_u,
         "flow_v": d.flow_v,
         "reason": clean(d.reason),

@@ -27,7 +27,7 @@ from gliderwatch.incidents.notices import (
 from gliderwatch.incidents.send_schedule import is_reminder_due
 from gliderwatch.incidents.state_machine import TRANSITIONS, Event, Phase
 from gliderwatch.incidents.threads import by_thread, thread_id
-from gliderwatch.model import Assessment, Fix, Incident, Kind, Severity
+from gliderwatch.model import Fix, Incident, Kind, Severity
 
 
 def health_incidents(glider: str, rows: Iterable[tuple[float, Judged]]) -> tuple[HealthIncident, ...]:
@@ -134,7 +134,7 @@ def announce(
     """
     if not rows:
         return before, []
-    rolling = tuple(i for i in anomalies if i.kind is Kind.ANOMALY and (_rolls(i.worst) or _rolls(i.last)))
+    rolling = tuple(i for i in anomalies if i.kind is Kind.ANOMALY and (i.worst.rolls or i.last.rolls))
     now = _Now(rows[-1][0], fix, acks, reminder_hours, rolling, reminded)
     incidents = health_incidents(glider, rows)
     matched = _matched(before, incidents)
@@ -157,12 +157,6 @@ def announce(
                 notices += more
             threads.append(thread)
     return tuple(t for t in threads if not _is_past(t, now.latest)), notices
-
-
-def _rolls(dive: Assessment) -> bool:
-    """Whether a dive rolls otherwise than usual."""
-    roll, low, high = (dive.evidence.get(f"roll_mean{each}") for each in ("", "_low", "_high"))
-    return roll is not None and low is not None and high is not None and not low <= roll <= high
 
 
 def _is_past(thread: HealthThread, latest: float) -> bool:

@@ -226,7 +226,7 @@ def _new_regime(
     """
     dives = last_dives(facts, 1 + REGIME_DIVES)
     for k, dive in enumerate(dives):
-        before = dive.evidence.get("usual_before")
+        before = dive.usual_before
         if renewed is not None and dive.t_dive <= renewed:
             break
         if before is not None and dive.speed is not None and latest.t_surface - dive.t_surface < NEWS:

@@ -102,7 +102,7 @@ def _says_of_anomaly(dive: Assessment, is_open: bool) -> bool | None:
     speed: one just inside the bound is not well again."""
     if dive.flag == Flag.FALSE_ALARM:
         return None
-    usual, speed = dive.evidence.get("usual_speed"), dive.speed
+    usual, speed = dive.usual_speed, dive.speed
     if is_open and dive.flag == Flag.NORMAL and usual is not None and speed is not None:
         near = dive.speed_min + WELL * (usual - dive.speed_min)
         return None if speed < near else False
@@ -113,7 +113,7 @@ def is_severe(dive: Assessment) -> bool:
     """Whether a speed is below two thirds of the lower bound of the normal range, and surely below that."""
     if dive.speed is None:
         return False
-    sigma = dive.evidence.get("speed_sigma", 0.0)
+    sigma = dive.speed_sigma or 0.0
     return dive.speed < SEVERE * dive.speed_min and dive.speed + SURELY * sigma < dive.speed_min
 
 

@@ -227,7 +227,7 @@ def since(view: GliderView) -> str:
 
 
 def _speed(dive: Assessment) -> str:
-    sigma = dive.evidence.get("speed_sigma")
+    sigma = dive.speed_sigma
     if dive.speed is None or not isfinite(dive.speed):
         return f"not known, normal {dive.speed_min:.2f}-{dive.speed_max:.2f} m/s"
     error = "" if sigma is None else f" ± {sigma:.2f}"
@@ -243,7 +243,7 @@ def bullet(dive: Assessment) -> Markup | None:
     low, high, at = (200 * max(x, 0.0) / top for x in (dive.speed_min, dive.speed_max, dive.speed))
     is_out = not dive.speed_min <= dive.speed <= dive.speed_max
     colour = "bad" if is_out else "ok"
-    sigma = 200 * dive.evidence.get("speed_sigma", 0.0) / top
+    sigma = 200 * (dive.speed_sigma or 0.0) / top
     label = f"{dive.speed:.2f} m/s of {dive.speed_min:.2f} to {dive.speed_max:.2f}"
     return Markup(
         '<svg class="bullet" viewBox="0 0 200 14" role="img" aria-label="{label}">'

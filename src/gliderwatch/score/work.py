@@ -217,7 +217,7 @@ def _result(a: Assessment, truth: DiveTruth | None) -> DiveResult:
         a.t_surface,
         a.flag,
         a.speed,
-        getattr(a, "speed_sigma", a.evidence.get("speed_sigma")),
+        a.speed_sigma,
         truth.speed if truth is not None else None,
         truth.believed_speed if truth is not None else None,
     )
