@@ -77,6 +77,9 @@ def show(found: dict, event: float, online: Path) -> None:
     for words, judged in (("dbd", found["full"]), ("sbd", found["online"])):
         early = sum(i["opened_at"] < event for i in judged["incidents"])
         print(f"  incidents by {words} before the event: {early}, in all {len(judged['incidents'])}")
+        for one in judged["incidents"]:
+            if one["opened_at"] < event < (one["cleared_at"] or float("inf")):
+                print(f"  by {words} one was open already, since {when(one['since'])}")
     print(f"  flags by sbd before, after: {flags(online, event)}", flush=True)
 
 
