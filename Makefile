@@ -41,7 +41,7 @@ install: $(VENV)/installed ## install gliderwatch and its tools into .venv, from
 test test-all: export PYTHONDONTWRITEBYTECODE =
 test: SLOW := and not slow
 
-test: $(VENV)/installed ## run the tests, in some 10 minutes on 2 cores; those that measure time first and alone
+test: $(VENV)/installed ## run the tests, in some 5 minutes on 2 cores; those that measure time first and alone
 	$(PYTEST)
 
 test-all: $(VENV)/installed ## the same, and those marked `slow`: the long versions of what the others test too

@@ -66,11 +66,13 @@ def text_of(driver: Any) -> str:
 
 def pressed(driver: Any, words: str) -> str:
     """What the next page says after the button of some words was pressed."""
-    for button in driver.find_elements("tag name", "button"):
-        if words in button.text:
-            button.click()
-            return text_of(driver)
-    raise AssertionError(f"no button {words}: {text_of(driver)}")
+    from selenium.webdriver.support.expected_conditions import staleness_of
+
+    button = next((b for b in driver.find_elements("tag name", "button") if words in b.text), None)
+    assert button is not None, f"no button {words}: {text_of(driver)}"
+    button.click()
+    until(lambda: staleness_of(button)(driver), "the page of the button is left")
+    return text_of(driver)
 
 
 def free_port() -> int:

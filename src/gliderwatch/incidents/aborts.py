@@ -48,8 +48,8 @@ class ReportInCall:
 
 @dataclass(frozen=True, slots=True)
 class Episode:
-    """What people were notified of since a glider fell out of its mission: the ``reports`` in so many
-    ``messages``, the last at ``time`` (s); ``cleared`` when it was in its mission again (s)."""
+    """What people were notified of since a glider fell out of its mission: the ``reports``, each once, in so
+    many ``messages``, the last at ``time`` (s); ``cleared`` when it was in its mission again (s)."""
 
     id: str
     reports: tuple[AbortReport, ...]
@@ -133,7 +133,9 @@ def announce(
             episodes.append(Episode(identity, (), 0, one.report.t))
         was_info = bool(episodes[k].reports) and episodes[k].severity is Severity.INFO
         cleared = None if was_info else episodes[k].cleared
-        episodes[k] = replace(episodes[k], reports=(*episodes[k].reports, one.report), cleared=cleared)
+        # what was history, as its own call had not come yet, is the abort itself from now on
+        others = (other for other in episodes[k].reports if not _is_same(one.report, other))
+        episodes[k] = replace(episodes[k], reports=(*others, one.report), cleared=cleared)
         fresh.setdefault(k, []).append(one)
     for k, new in fresh.items():
         episodes[k], notice = _aborted(glider, episodes[k], new)
