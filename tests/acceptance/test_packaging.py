@@ -93,7 +93,7 @@ def test_wheel_carries_presets_licence_and_command(tmp_path: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
         commands = next(name for name in names if name.endswith("entry_points.txt"))
-        assert "gliderwatch = gliderwatch.cli.main:main" in archive.read(commands).decode()
+        assert "gliderwatch = gliderwatch.__main__:main" in archive.read(commands).decode()
     for path in sorted((ROOT / "src").rglob("*.py")):
         assert path.relative_to(ROOT / "src").as_posix() in names
     assert "gliderwatch/config/presets.yml" in names

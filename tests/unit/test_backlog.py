@@ -110,11 +110,49 @@ def test_what_is_decoded_at_once_has_its_bounds_but_for_newcomers() -> None:
             backlog.add(job(f"g{n}", opened_at))
     begun = started(backlog, HELD)
     assert len(begun) == HELD and backlog.is_full and backlog.next() is None
+    for one in begun[1:]:
+        assert backlog.left is None  # more is on its way
+        backlog.finish(one, DONE)
+        name = one.header.id.glider
+        assert backlog.ready(name) == [one]  # its turn is later
     backlog.finish(begun[0], DONE)
+    assert backlog.left == "g0"
     assert backlog.ready("g0") == [begun[0]]
     backlog.add(job("new", 1.0))
     newcomer = backlog.next()
     assert newcomer is not None and newcomer.header.id.glider == "new" and backlog.next() is None
+
+
+def test_a_run_waits_for_the_rest_of_its_turn_while_runs_let_go_what_is_held() -> None:
+    """Else nearly all files of many gliders would be taken one by one, as soon as many are held."""
+    backlog = Backlog()
+    gliders = [f"g{n}" for n in range(HELD + RUN)]
+    for glider in gliders:
+        for opened_at in range(2 * RUN):
+            backlog.add(job(glider, opened_at))
+    runs, decoding, alone = list[str](), list[Job](), 0
+    while len(backlog):
+        while len(decoding) < 4 and (begun := backlog.next()) is not None:
+            decoding.append(begun)
+        if decoding:
+            one = decoding.pop(0)
+            backlog.finish(one, DONE)
+            glider = one.header.id.glider
+        elif runs:
+            glider = runs.pop(0)
+            for _ in backlog.end_run(glider):
+                backlog.decoded(glider)
+        else:
+            assert backlog.left is not None, "it goes on"
+            glider = backlog.left
+        found = backlog.ready(glider)
+        if len(found) > 1:
+            backlog.begin_run(glider, len(found))
+            runs.append(glider)
+        elif found:
+            backlog.decoded(glider)
+            alone += 1
+    assert alone <= 2 * len(gliders)
 
 
 def test_a_file_is_taken_after_those_before_it() -> None:

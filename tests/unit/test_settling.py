@@ -72,7 +72,7 @@ def test_what_is_there_no_more_is_forgotten_though_not_what_still_waits(settling
     settling.observe(LONG, 100, 1, now=0.0)
     settling.ready(0.0)
     settling.observe(SHORT, 100, 1, now=0.0)
-    settling.only({LONG})
+    settling.only({str(LONG)})
     assert settling.passed(LONG) == (100, 1)
     settling.only(set())
     assert settling.passed(LONG) is None

@@ -88,16 +88,27 @@ class Backlog:
 
     def ready(self, glider: str) -> list[Job]:
         """The next files of a glider to take that are decoded, as many as may make a run, one where the list
-        is short; none while a run is being processed, or while more files are on their way to be in it."""
+        is short; none while a run is being processed, or while more files are on their way to be in it: those
+        being decoded, and those of the glider whose turn it is."""
         queue = self._queues.get(glider)
         if queue is None or queue.in_run:
             return []
         most = RUN if self._is_long else 1
         found = list(islice(takewhile(lambda job: job.result is not None, queue.decoding), most))
-        more = self.behind(glider) > len(found)
-        if len(found) < most and more and self.behind(glider) >= FEWEST and not self.is_full:
-            return []
-        return found
+        is_its_turn = bool(queue.waiting) and next(iter(self._queues)) == glider
+        is_more_to_come = self._is_at_work and (len(found) < len(queue.decoding) or is_its_turn)
+        return [] if len(found) < most and is_more_to_come and self.behind(glider) >= FEWEST else found
+
+    @property
+    def _is_at_work(self) -> bool:
+        return bool(self.decoding or self.running)
+
+    @property
+    def left(self) -> str | None:
+        """A glider whose decoded files wait for more of its own that cannot be decoded: too many are held,
+        and nothing is at work any more that would let some go."""
+        at_rest = () if self._is_at_work else self._queues.items()
+        return next((glider for glider, queue in at_rest if queue.decoding), None)
 
     def begin_run(self, glider: str, files: int) -> None:
         """The next files of a glider are being processed."""

@@ -342,50 +342,51 @@ class Settling:
 
     A long name is complete at once, and a log is read as it grows; an 8.3 name when size and mtime have
     been still for `settle_seconds`. What mtime says is never compared with a clock, for it is the glider's.
-    `now` is in seconds of any clock that does not jump (monotonic).
+    `now` is in seconds of any clock that does not jump (monotonic). Of a hundred thousand files it keeps the
+    names as text: a `Path` takes four times as much.
     """
 
     def __init__(self, settle_seconds: float) -> None:
         self.settle_seconds = settle_seconds
-        self._waiting: dict[Path, _Entry] = {}
-        self._passed: dict[Path, tuple[int, int]] = {}
+        self._waiting: dict[str, _Entry] = {}
+        self._passed: dict[str, tuple[int, int]] = {}
 
     def observe(self, path: Path, size: int, mtime_ns: int, now: float) -> None:
         """Takes note of a file as a scan or an event shows it; a change of state begins the wait again."""
-        state = (size, mtime_ns)
-        entry = self._waiting.get(path)
-        if self._passed.get(path) == state or (entry and (entry.size, entry.mtime_ns) == state):
+        state, name = (size, mtime_ns), str(path)
+        entry = self._waiting.get(name)
+        if self._passed.get(name) == state or (entry and (entry.size, entry.mtime_ns) == state):
             return
-        self._passed.pop(path, None)
+        self._passed.pop(name, None)
         at_once = is_long(path.name) or is_log(path.name)
         wait = 0.0 if at_once else self.settle_seconds
-        self._waiting[path] = _Entry(size, mtime_ns, now + wait)
+        self._waiting[name] = _Entry(size, mtime_ns, now + wait)
 
     def ready(self, now: float) -> list[Path]:
         """The files that are complete now, those that waited longest first; each state of a file once."""
-        due = sorted((path for path, entry in self._waiting.items() if entry.due <= now), key=self._order)
-        for path in due:
-            entry = self._waiting.pop(path)
-            self._passed[path] = (entry.size, entry.mtime_ns)
-        return due
+        due = sorted((name for name, entry in self._waiting.items() if entry.due <= now), key=self._order)
+        for name in due:
+            entry = self._waiting.pop(name)
+            self._passed[name] = (entry.size, entry.mtime_ns)
+        return list(map(Path, due))
 
     def passed(self, path: Path) -> tuple[int, int] | None:
         """Size and mtime (ns) with which a file passed last."""
-        return self._passed.get(path)
+        return self._passed.get(str(path))
 
     def forget(self, path: Path) -> None:
         """Knows nothing of a file any more: it is gone, or is to be let pass once more."""
-        self._waiting.pop(path, None)
-        self._passed.pop(path, None)
+        self._waiting.pop(str(path), None)
+        self._passed.pop(str(path), None)
 
-    def only(self, there: Container[Path]) -> None:
+    def only(self, there: Container[str]) -> None:
         """Forgets the files that passed and are not `there` any more; one that comes back passes again."""
-        self._passed = {path: state for path, state in self._passed.items() if path in there}
+        self._passed = {name: state for name, state in self._passed.items() if name in there}
 
     def next_deadline(self, now: float) -> float | None:
         """Seconds from `now` until the next file may be complete; None when none waits."""
         due = min((entry.due for entry in self._waiting.values()), default=None)
         return None if due is None else max(due - now, 0.0)
 
-    def _order(self, path: Path) -> tuple[float, Path]:
-        return self._waiting[path].due, path
+    def _order(self, name: str) -> tuple[float, str]:
+        return self._waiting[name].due, name

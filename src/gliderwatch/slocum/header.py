@@ -10,6 +10,7 @@ import calendar
 import os
 import re
 import stat
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -199,10 +200,10 @@ def parse_header(data: bytes, *, science: bool = False) -> Header:
     ):
         raise Quarantine("the numbers of sensors in the header contradict each other")
     return Header(
-        id=SegmentId(_opened_at(tags["fileopen_time"]), glider, full_name),
-        mission=tags["mission_name"].lower(),
-        kind=kind,
-        crc=tags["sensor_list_crc"].lower(),
+        id=SegmentId(_opened_at(tags["fileopen_time"]), sys.intern(glider), full_name),
+        mission=sys.intern(tags["mission_name"].lower()),  # one of a hundred thousand files that say so
+        kind=sys.intern(kind),
+        crc=sys.intern(tags["sensor_list_crc"].lower()),
         factored=tags["sensor_list_factored"] == "1",
         n_sensors=n_sensors,
         n_held=n_held,
