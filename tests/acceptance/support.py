@@ -37,6 +37,14 @@ GLIDERWATCH = Path(os.environ.get("GLIDERWATCH_COMMAND", _OWN))
 PATIENCE = 60.0
 PASSWORD = "hunter2-do-not-tell"
 TRACEBACK = "Traceback"
+UNBORN = re.compile(
+    TRACEBACK
+    + r""" \(most recent call last\):
+  File "<string>", line 1, in <module>
+(  File "[^"]*/multiprocessing/spawn\.py", line \d+, in (spawn_main|_main)
+(    .*\n)+)+EOFError: Ran out of input
+"""
+)
 
 
 def until(condition: Callable[[], object], what: str, patience: float = PATIENCE) -> None:
@@ -334,8 +342,9 @@ class Daemon:
             return f'"pid": {self.pid},'.encode() in log.read()
 
     def text(self) -> str:
-        """All that it ever said."""
-        return self.log_path.read_text(encoding="utf-8") if self.log_path.exists() else ""
+        """All that it ever said; without what Python itself says of a process that it was starting for a
+        daemon that was killed just then: nothing of gliderwatch is loaded in it yet."""
+        return UNBORN.sub("", self.log_path.read_text(encoding="utf-8") if self.log_path.exists() else "")
 
     def log(self, event: str) -> list[dict[str, Any]]:
         """Lines of its log with an event, a pattern."""

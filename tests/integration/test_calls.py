@@ -31,11 +31,13 @@ DONE = "zModem transfer DONE for file 01030033.scd\n"
 LOST = "Connection Event: Carrier Detect lost.\n"
 
 
-def history(count: int, cause: str = "LEAK", t: float = T0 - HOUR) -> str:
-    at = datetime.fromtimestamp(t, UTC).strftime("%Y-%m-%dT%H:%M:%S")
+def history(count: int, cause: str = "LEAK", t: float | None = T0 - HOUR) -> str:
     text = f"ABORT HISTORY: total since reset: {count}\n"
     if count:
-        text += f"ABORT HISTORY: last abort cause: MS_ABORT_{cause}\nABORT HISTORY: last abort time: {at}\n"
+        text += f"ABORT HISTORY: last abort cause: MS_ABORT_{cause}\n"
+    if count and t is not None:
+        at = datetime.fromtimestamp(t, UTC).strftime("%Y-%m-%dT%H:%M:%S")
+        text += f"ABORT HISTORY: last abort time: {at}\n"
     return text
 
 
@@ -182,8 +184,11 @@ class TestWithoutFile:
         assert dock.call(T0, status(T0) + LOST) == []
 
 
-def test_order_of_arrival_does_not_matter_for_the_end(tmp_path: Path) -> None:
-    texts = [history(0) + DONE, ABORTING + FELL + PROMPT, history(1, t=T0 + 6 * HOUR) + DONE, LOST]
+@pytest.mark.parametrize("said_at", [T0 + 6 * HOUR, None])
+def test_order_of_arrival_does_not_matter_for_the_end(tmp_path: Path, said_at: float | None) -> None:
+    """Nor whether the first history says when the abort was: a line of it may be lost."""
+    none_before = "" if said_at is None else history(0)
+    texts = [none_before + DONE, ABORTING + FELL + PROMPT, history(1, t=said_at) + DONE, LOST]
     ends = set()
     for order in itertools.permutations(range(4)):
         folder = tmp_path / "".join(map(str, order))
