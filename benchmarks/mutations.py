@@ -34,8 +34,7 @@ TESTS = {
     "navigation": "unit/test_heuristics_navigation unit/test_dac unit/test_dives unit/test_features"
     " unit/test_fixes unit/test_flight unit/test_flight_samples unit/test_track unit/test_clock"
     " unit/test_pressure",
-    "sea": "unit/test_heuristics_sea unit/test_gauss_markov unit/test_ocean_field unit/test_tides"
-    " integration/test_ocean",
+    "sea": "unit/test_heuristics_sea unit/test_gauss_markov unit/test_ocean_field unit/test_tides",
     "estimation": "unit/test_heuristics_estimation unit/test_verdict_misfit unit/test_speed_range"
     " unit/test_healthy_baseline unit/test_kinematic_speed unit/test_step_test unit/test_adaptive"
     " unit/test_verdict unit/test_kalman unit/test_glider_estimate",

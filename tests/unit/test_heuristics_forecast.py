@@ -223,6 +223,29 @@ class TestSteering:
     def test_one_heading_aside_after_many_is_no_new_goal_yet(self):
         assert self.unsent(1.5, legs=8) == pytest.approx(0.39, abs=0.05)
 
+    def test_a_goal_is_thought_of_at_each_seven_and_a_half_degrees(self):
+        """So one at 2.5 degrees is taken for that at 0, but for a tenth; with twice as many it is found."""
+        flown = tuple(Leg((0.0, 0.0), math.radians(2.5), (0.0, 0.0), SPEED, HOUR) for _ in range(12))
+        course = courses(Plan(np.array([1.0, 0.0]), None, 1.0, np.zeros(2), SPEED, legs=flown), HOUR)
+        made = math.degrees(math.atan2(course[3].heading[1], course[3].heading[0]))
+        assert made == pytest.approx(0.26, abs=0.1)
+
+    def past(self, distance: float) -> float:
+        """The part of 8 h after a goal so far to the north (m) is reached, to which nine legs by it led."""
+        legs = tuple(
+            Leg((float(x), 0.0), math.atan2(distance, -x), (0.0, 0.0), SPEED, HOUR)
+            for x in np.linspace(-4e3, 4e3, 9)
+        )
+        plan = Plan(np.array([0.0, 1.0]), None, 1.0, np.zeros(2), SPEED, legs=legs)
+        return courses(plan, 8 * HOUR)[3].unknown
+
+    def test_a_goal_is_thought_of_on_eight_rings_and_the_way_to_it_in_two_steps(self):
+        """One 3 km off is reached in the second half, one at 6 km is taken for one on a ring that is not.
+        With four rings or one step none is reached, with more steps that at 6 km is."""
+        assert self.past(3e3) == pytest.approx(0.5, abs=0.02)
+        assert self.past(2.5e3) == pytest.approx(0.09, abs=0.03)
+        assert self.past(6e3) < 0.01
+
     def test_where_all_ways_were_alike_the_waypoint_is_followed_rather(self):
         """Two of the ways go on to the east as before, two go to the waypoint in the north."""
         state = replace(NORTH, heading=(1.0, 0.0), scores=(0.01,) * 4)

@@ -210,6 +210,23 @@ def test_a_new_way_of_flying_is_seen_by_depth_rate_and_pitch_where_the_way_hides
     assert set(flags(verdicts[22:])) == {Flag.NORMAL}
 
 
+@pytest.mark.parametrize(("part", "is_new_way"), [(0.8, True), (0.6, False)])
+def test_a_change_of_pitch_explains_no_loss_of_two_fifths_of_the_speed(part, is_new_way):
+    """The pilot has it fly flatter, and all measurements agree on a lower speed."""
+    made = ways(30, 3, lambda k: 0.7 * (k // 5))
+    made[20:] = [replace(way, speed=part * way.speed, own=part * way.own) for way in made[20:]]
+    dives = []
+    for k, (way, each) in enumerate(zip(made, mission(made), strict=True)):
+        pitch = 0.45 if k < 20 else 0.35
+        rate = way.own * math.tan(pitch)
+        angles = {"pitch_dive": -pitch, "pitch_climb": pitch}
+        rates = {"depth_rate_dive": rate, "depth_rate_climb": -rate}
+        dives.append(replace(each, features=replace(each.features, **angles, **rates)))
+    _, verdicts = run(dives)
+    assert any("flies in a new way" in verdict.reason for verdict in verdicts) == is_new_way
+    assert set(flags(verdicts[26:])) == {Flag.NORMAL if is_new_way else Flag.ANOMALY}
+
+
 # --------------------------------------------------------------------------- what a speed means
 
 
