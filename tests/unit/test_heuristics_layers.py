@@ -124,6 +124,21 @@ def test_a_day_and_a_half_in_the_band_is_the_most(hours: float, mode: Mode) -> N
     assert follow(KNOWN, seen, "temperature").mode is mode
 
 
+def deep(*differences: float) -> list[Cast]:
+    """Five casts that end in the layer, and deeper ones with these changes of temperature in it."""
+    seen = [cast.within(0.0, 108.0) for cast in casts(100.0, 120.0)[:5]]
+    return seen + [
+        casts(100.0, 120.0, difference=each, t=1e4 + 1e3 * k)[0] for k, each in enumerate(differences)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("differences", "mode"), [((4.2, 4.2, 3.4), Mode.TRACK), ((4.2, 3.4, 3.4), Mode.COMPLETE)]
+)
+def test_half_of_the_casts_through_a_layer_must_show_it(differences: tuple[float, ...], mode: Mode) -> None:
+    assert follow(Tracking(), deep(*differences), "temperature").mode is mode
+
+
 def test_two_casts_show_a_layer() -> None:
     assert follow(Tracking(), casts(100.0, 120.0)[:2], "temperature").mode is Mode.TRACK
 

@@ -2,15 +2,18 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from gliderwatch.model import Fix, readonly
-from gliderwatch.sea import gauss_markov
+from gliderwatch.sea import gauss_markov, ocean_files, smoother
 from gliderwatch.sea.flow_forecast import Currents, learn, notes, predict, unknown_sea
 from gliderwatch.sea.gauss_markov import FlowParams, crossing, intensities, prior, rates
 from gliderwatch.sea.ocean_field import Field
+from gliderwatch.sea.smoother import MeanCurrent
 from gliderwatch.sea.tides import Constituent, aliasing
 
 HOUR, DAY = 3600.0, 86400.0
@@ -170,3 +173,42 @@ class TestField:
         monkeypatch.setattr(Field, "at", lambda self, t, *place: (seen.append(t), at(self, t, *place))[1])
         self.field().between(Fix(0.0, 20.2, 0.2), Fix(HOUR, 20.8, 1.8), 10.0)
         assert len(seen) == 8
+
+    @pytest.mark.parametrize(("speed", "known"), [(9.0, True), (11.0, False)])
+    def test_no_current_is_faster_than_10_metres_a_second(self, speed, known):
+        """A fill value that the file does not call one."""
+        values = xr.DataArray([0.2, -speed], dims="time", attrs={"units": "m s-1"})
+        assert np.isfinite(ocean_files._values(Path("of-a-model.nc"), values, ["time"])).tolist() == [
+            True,
+            known,
+        ]
+
+
+class TestSmoother:
+    def mission(self, current, n: int = 60) -> list[MeanCurrent]:
+        """Dives of 3 h, one after the other, in a current to the east (m/s) by the time (h)."""
+        return [
+            MeanCurrent(3 * k * HOUR, 3 * (k + 1) * HOUR, readonly([current(3 * k + 1.5), 0.0]), 0.02, 54.0)
+            for k in range(n)
+        ]
+
+    def test_currents_are_given_each_half_hour(self):
+        found = smoother.smooth(self.mission(lambda hours: 0.1, 4), FlowParams())
+        assert max(np.diff(found.delayed.t)) == 1800.0
+
+    def test_where_a_dive_begins_two_fixes_are_a_metre_apart(self):
+        params = FlowParams()
+        steps, _ = smoother._forward(self.mission(lambda hours: 0.1, 2), params, 1.0, HOUR)
+        assert np.sqrt(np.diag(steps[0].cov)[params.mean]) == pytest.approx([1.0, 1.0])
+
+    def test_the_calmest_sea_is_a_tenth_and_the_liveliest_ten_times_as_restless(self):
+        """And a tide that is not there is a thirtieth of the prior, a strong one is the prior itself."""
+        chance = np.random.default_rng(1)
+        calm = smoother.smooth(self.mission(lambda hours: 0.1), FlowParams())
+        wild = smoother.smooth(self.mission(lambda hours: float(chance.normal(0.0, 0.8))), FlowParams())
+        tide = smoother.smooth(
+            self.mission(lambda hours: 1.5 * math.cos(hours * 2 * math.pi / 12.42)), FlowParams()
+        )
+        assert (calm.scale, calm.tides) == (0.1, 0.03)
+        assert wild.scale == 10.0
+        assert tide.tides == 1.0
