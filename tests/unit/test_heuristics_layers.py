@@ -8,10 +8,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gliderwatch.layers.band import Band, Mode, Tracking, cost_slope, follow
+from gliderwatch.layers.advice import LayerParams, advise
+from gliderwatch.layers.band import Band, Method, Mode, Tracking, _shifted, cost_slope, follow
 from gliderwatch.layers.casts import Cast, bin_of, split
 from gliderwatch.layers.composite import Composite, in_layer, layers_of
-from gliderwatch.model import Series, readonly
+from gliderwatch.layers.flown import compare, methods
+from gliderwatch.model import Segment, SegmentId, Series, readonly
 
 
 def ways(*turns: float) -> Series:
@@ -146,3 +148,42 @@ def test_two_casts_show_a_layer() -> None:
 def test_the_first_step_of_the_filter() -> None:
     """By hand: 10 m at Q = 3e-5 and R = 0.03 give s = 2 R + 100 Q = 0.063, a gain of 10 Q / s."""
     assert cost_slope([[(10.0, 1.0)]]) == pytest.approx(1 / 210)
+
+
+def test_the_filter_moves_the_band_by_a_quarter_of_its_half_squared_times_the_slope() -> None:
+    """A band of 32 m and 2 m on either side: 18 squared over 4, times a slope of 1 / 210."""
+    found = _shifted(KNOWN, [[(10.0, 1.0)]], 2.0)
+    assert found.top == pytest.approx(84.0 + 81.0 / 210.0)
+
+
+# ---------------------------------------------------------------------------- advice
+
+PARAMS = LayerParams("temperature", 200.0, 0.0, 0.0, Method.COMPOSITE, 2)
+
+
+def above(*bottoms: float) -> Segment:
+    """A segment in which these depths of the bottom were measured."""
+    series = Series(readonly(np.arange(float(len(bottoms)))), readonly(bottoms))
+    return Segment(
+        SegmentId(0.0, "sim", "sim-2026-1-1-1"), "", "sbd", 400.0, (0, 1, ""), {"water_depth": series}
+    )
+
+
+@pytest.mark.parametrize(("height", "mode"), [(2.8, Mode.COMPLETE), (3.2, Mode.TRACK)])
+def test_a_band_of_3_m_is_the_least(height: float, mode: Mode) -> None:
+    found = advise(
+        replace(KNOWN, band=Band(100.0, 120.0)), above(), 0.0, replace(PARAMS, max_depth=100.0 + height)
+    )
+    assert found.mode is mode
+
+
+@pytest.mark.parametrize(("wrong", "bottom"), [(2, 100.0), (3, 96.0)])
+def test_one_depth_of_the_bottom_in_ten_may_be_too_shallow(wrong: int, bottom: float) -> None:
+    found = advise(Tracking(), above(*[96.0] * wrong, *[100.0] * (21 - wrong)), 0.0, PARAMS)
+    assert found.full.bottom == bottom
+
+
+def test_two_full_casts_of_segments_of_six_are_compared() -> None:
+    segments = [casts(84.0, 116.0)[:n] for n in (5, 6, 6)]
+    assert len(compare(segments, "temperature")["full yos"]) == 2
+    assert methods("temperature")["composite, two full casts"][1] == 2
