@@ -161,6 +161,11 @@ class TestSlowLeak:
         assert "inHg a week" in finding.text
         assert [seed for seed in range(40) if found("slow_leak", self.rows(0.0, seed=seed))] == []
 
+    def test_a_fifth_of_an_inch_a_week_is_none(self) -> None:
+        """However sure it is: over twelve days its standard error is 0.015."""
+        assert found("slow_leak", self.rows(0.3, days=12.0)) is not None
+        assert found("slow_leak", self.rows(0.2, days=12.0)) is None
+
     def test_at_the_surface_alone(self) -> None:
         h = self.rows(1.0)
         surface = History(({"gas_density_surface": h.get("gas_density")},), {})

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from gliderwatch.health.battery import battery_end
+from gliderwatch.health.battery import END, battery_end
 from gliderwatch.health.leaks import trend
 from gliderwatch.health.readings import History, Readings, joined, of_segment, recent
 from gliderwatch.health.rule import Finding
@@ -257,3 +257,8 @@ def test_a_reading_five_deviations_off_the_line_is_drawn_in() -> None:
     v[-1] = 7.5e4
     part = trend(t, v)[0] / np.polyfit(t, v, 1)[0]
     assert 0.5 < part < 0.75
+
+
+def test_what_a_battery_holds_is_given_in_ampere_hours_and_reckoned_in_coulombs() -> None:
+    (limit,) = (limit for limit in END.limits if limit.name == "capacity")
+    assert (limit.unit, limit.si) == ("Ah", 3600.0)
