@@ -10,6 +10,7 @@ from dives_by_letters import World, dive
 from gliderwatch.incidents import aborts, calls
 from gliderwatch.incidents.acknowledgement import acknowledge
 from gliderwatch.incidents.constants import PLACES
+from gliderwatch.incidents.facts import situation
 from gliderwatch.incidents.irregularities import irregularities
 from gliderwatch.incidents.notices import Unjudged
 from gliderwatch.incidents.overdue import (
@@ -47,7 +48,7 @@ class TestIncidents:
         assert not is_severe(replace(SLOW, speed=0.70 * low))
         assert is_severe(replace(SLOW, speed=0.63 * low))
 
-    @pytest.mark.parametrize("slower, holds", [(0.04, True), (0.06, False)])
+    @pytest.mark.parametrize("slower, holds", [(0.04, True), (0.055, False)])
     def test_an_anomaly_has_grown_worse_by_5_cm_s(self, slower, holds):
         ack = acknowledge(incident(replace(SLOW, speed=0.19, speed_min=0.2)), "ann", "", T0)
         worse = incident(replace(SLOW, speed=0.19 - slower, speed_min=0.2))
@@ -67,6 +68,16 @@ class TestAnnouncements:
         cleared = next(i.cleared_at for i in world.incidents())
         last = replace(last, t_surface=cleared + hours * HOUR)
         assert len(Announcer().update(World({**world.dives, last.t_dive: last}))) == count
+
+    @pytest.mark.parametrize("back, kinds", [(7, ["regime"]), (8, ["regime"]), (9, [])])
+    def test_a_new_way_of_flying_is_news_eight_dives_later(self, back, kinds):
+        """Of dives of an hour, which all came together."""
+        made = [dive(k, "0", t_dive=k * HOUR, t_surface=k * HOUR + 3000.0) for k in range(12)]
+        made[11 - back] = replace(made[11 - back], evidence={**made[11 - back].evidence, "usual_before": 0.3})
+        assert Announcer().update(World({one.t_dive: one for one in made})) == kinds
+
+    def test_a_message_names_the_speeds_of_five_dives(self):
+        assert len(situation(World.of("0" * 12)).speeds) == 5
 
     def corrections(self, **changes) -> list[str]:
         """What is said when the last dive of an open incident is known better."""
