@@ -252,8 +252,8 @@ class TestAnnouncedFiles:
     def test_one_that_never_came_is_named_an_hour_later(self, dock: Dock) -> None:
         dock.call(T0, status(T0) + self.BOTH)
         known = dock.store.facts("electa")
-        assert known.not_come(T0 - HOUR, T0 + 0.5 * HOUR) == ()
-        assert known.not_come(T0 - HOUR, T0 + 2 * HOUR) == ((T0, "01030033.scd"),)
+        assert known.not_come(T0 - HOUR, T0 + 0.9 * HOUR) == ()
+        assert known.not_come(T0 - HOUR, T0 + 1.1 * HOUR) == ((T0, "01030033.scd"),)
 
     def test_one_that_came_under_its_full_name_is_not(self, dock: Dock) -> None:
         dock.call(T0, status(T0) + self.BOTH)

@@ -24,6 +24,7 @@ from gliderwatch.incidents.overdue import (
     outlook,
     rhythm,
 )
+from gliderwatch.incidents.send_schedule import next_reminder
 from gliderwatch.incidents.state_machine import is_severe
 from gliderwatch.incidents.unjudged import blindness
 from gliderwatch.incidents.whereabouts import drift
@@ -75,6 +76,10 @@ class TestAnnouncements:
         made = [dive(k, "0", t_dive=k * HOUR, t_surface=k * HOUR + 3000.0) for k in range(12)]
         made[11 - back] = replace(made[11 - back], evidence={**made[11 - back].evidence, "usual_before": 0.3})
         assert Announcer().update(World({one.t_dive: one for one in made})) == kinds
+
+    @pytest.mark.parametrize("age, following", [(0.15, 1.0), (0.25, 2.0)])
+    def test_a_reminder_comes_a_fifth_of_a_day_sooner_at_most(self, age, following):
+        assert next_reminder(age) == following
 
     def test_a_message_names_the_speeds_of_five_dives(self):
         assert len(situation(World.of("0" * 12)).speeds) == 5
