@@ -48,7 +48,7 @@ TESTS = {
     "health": "unit/test_heuristics_health unit/test_health_rules unit/test_health_incidents",
     "incidents": "unit/test_heuristics_incidents unit/test_notifications unit/test_state_machine"
     " unit/test_overdue unit/test_unjudged unit/test_send_schedule unit/test_irregularities"
-    " unit/test_neighbours integration/test_calls",
+    " unit/test_neighbours",
 }
 """The fast tests of each room."""
 CHANGES = {"half": 0.5, "double": 2.0}

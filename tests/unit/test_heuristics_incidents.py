@@ -275,3 +275,10 @@ class TestFiles:
         dives = tuple(replace(SLOW, t_dive=T0 + k * HOUR, t_surface=T0 + (k + 1) * HOUR) for k in range(20))
         store.apply("electa", Outcome(GliderState(), T0, dives, (), None))
         assert len(store.facts("electa").places(PLACES)) == 12
+
+    @pytest.mark.parametrize(("later", "missing"), [(0.9 * HOUR, []), (1.1 * HOUR, ["01030033.scd"])])
+    def test_a_file_that_was_announced_has_come_an_hour_later_or_does_not(self, later, missing):
+        store, call = Store.open(":memory:"), Call("unit", "log", T0, T0 + 60.0, announced=("01030033.scd",))
+        with store.transaction():
+            store.calls.keep("/logs/log", call, "", T0)
+        assert [name for _, name in store.facts("unit").not_come(T0 - 1.0, T0 + 60.0 + later)] == missing
