@@ -49,6 +49,18 @@ class TestIncidents:
         assert not is_severe(replace(SLOW, speed=0.70 * low))
         assert is_severe(replace(SLOW, speed=0.63 * low))
 
+    def test_one_dive_is_severe_two_standard_errors_below_the_range(self):
+        slow = replace(SLOW, speed=0.11, speed_min=0.2)
+        assert is_severe(replace(slow, evidence={**SLOW.evidence, "speed_sigma": 0.04}))
+        assert not is_severe(replace(slow, evidence={**SLOW.evidence, "speed_sigma": 0.05}))
+
+    @pytest.mark.parametrize("speed, cleared", [(0.225, False), (0.235, True)])
+    def test_an_anomaly_is_over_three_tenths_of_the_way_back_to_the_usual_speed(self, speed, cleared):
+        again = {"speed": speed, "speed_min": 0.2, "evidence": {**SLOW.evidence, "usual_speed": 0.3}}
+        made = [dive(k, "1") for k in range(3)] + [dive(k, "0", **again) for k in range(3, 8)]
+        (found,) = World({one.t_dive: one for one in made}).incidents()
+        assert (found.cleared_at is not None) == cleared
+
     @pytest.mark.parametrize("slower, holds", [(0.04, True), (0.055, False)])
     def test_an_anomaly_has_grown_worse_by_5_cm_s(self, slower, holds):
         ack = acknowledge(incident(replace(SLOW, speed=0.19, speed_min=0.2)), "ann", "", T0)
@@ -80,6 +92,9 @@ class TestAnnouncements:
     @pytest.mark.parametrize("age, following", [(0.15, 1.0), (0.25, 2.0)])
     def test_a_reminder_comes_a_fifth_of_a_day_sooner_at_most(self, age, following):
         assert next_reminder(age) == following
+
+    def test_a_reminder_comes_each_week_in_the_end(self):
+        assert [next_reminder(days) for days in (7.0, 14.0)] == [14.0, 21.0]
 
     def test_a_message_names_the_speeds_of_five_dives(self):
         assert len(situation(World.of("0" * 12)).speeds) == 5

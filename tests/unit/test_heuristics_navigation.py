@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gliderwatch.model import Current, DiveFeatures, Fix, SegmentId, Unusable
+from gliderwatch.model import Current, DiveFeatures, Fix, SegmentId, Series, Unusable, readonly
 from gliderwatch.navigation.clock import DAY, ROLLOVER, Stamp, corrections, forward_step, is_same
 from gliderwatch.navigation.dac import Report, new_reports, pair, updated
 from gliderwatch.navigation.dives import Navigation, extend, flight_notes, unsteered, why_unusable
 from gliderwatch.navigation.features import flight_features
 from gliderwatch.navigation.fixes import new_fixes, zeroed
-from gliderwatch.navigation.flight import Flight, find_flight, lengthened, prepare
+from gliderwatch.navigation.flight import Flight, downsample, find_flight, lengthened, prepare
 from gliderwatch.navigation.geodesy import from_plane
 from gliderwatch.navigation.track import build_track, closure
 from missions import LAT, LON, Leg, mission, segment, series
@@ -394,3 +394,8 @@ class TestZero:
 
     def test_a_quarter_of_the_depths_is_shallower(self):
         assert self.shown(4, 5, 6, 7, 8) == 5.0
+
+
+def test_what_the_science_computer_sends_is_kept_each_ten_seconds():
+    kept = downsample({"temperature": Series(readonly(np.arange(60.0)), readonly(np.arange(60.0)))})
+    assert kept["temperature"].t.tolist() == [4.5, 14.5, 24.5, 34.5, 44.5, 54.5]
