@@ -297,3 +297,12 @@ class TestFiles:
         with store.transaction():
             store.calls.keep("/logs/log", call, "", T0)
         assert [name for _, name in store.facts("unit").not_come(T0 - 1.0, T0 + 60.0 + later)] == missing
+
+    @pytest.mark.parametrize(("later", "reason"), [(0.45 * HOUR, "behavior surface_2"), (0.55 * HOUR, "")])
+    def test_a_call_within_half_an_hour_says_why_a_glider_came_up(self, later, reason):
+        store, began = Store.open(":memory:"), T0 + later
+        with store.transaction():
+            store.calls.keep(
+                "/logs/log", Call("unit", "log", began, began, reason="behavior surface_2"), "", T0
+            )
+        assert store.facts("unit").came_up(T0) == reason

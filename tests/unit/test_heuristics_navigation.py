@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gliderwatch.model import Current, DiveFeatures, Fix, SegmentId, Series, Unusable, readonly
+from gliderwatch.model import Call, Current, DiveFeatures, Fix, Segment, SegmentId, Series, Unusable, readonly
+from gliderwatch.navigation.call_fixes import missing_in_file
 from gliderwatch.navigation.clock import DAY, ROLLOVER, Stamp, corrections, forward_step, is_same
 from gliderwatch.navigation.dac import Report, new_reports, pair, updated
 from gliderwatch.navigation.dives import Navigation, extend, flight_notes, unsteered, why_unusable
@@ -399,3 +400,11 @@ class TestZero:
 def test_what_the_science_computer_sends_is_kept_each_ten_seconds():
     kept = downsample({"temperature": Series(readonly(np.arange(60.0)), readonly(np.arange(60.0)))})
     assert kept["temperature"].t.tolist() == [4.5, 14.5, 24.5, 34.5, 44.5, 54.5]
+
+
+@pytest.mark.parametrize(("later", "found"), [(1700.0, True), (1900.0, False)])
+def test_a_fix_in_a_call_within_half_an_hour_is_of_the_surfacing_of_the_file(later, found):
+    file = Segment(SegmentId(0.0, "sim", "sim-2026-1-1-1"), "m", "sbd", 7200.0, (0, 1, ""), {})
+    surfaced = Fix(7200.0 + later, LAT, LON)
+    call = Call("sim", "log", surfaced.t, surfaced.t + 60.0, surfaced=surfaced)
+    assert missing_in_file(file, [call], np.inf).fix == (surfaced if found else None)
