@@ -23,7 +23,12 @@ from gliderwatch.estimation.dive_measurement import (
 from gliderwatch.estimation.glider import speed_params
 from gliderwatch.estimation.healthy_baseline import Baseline, compare
 from gliderwatch.estimation.healthy_baseline import learn as learn_baseline
-from gliderwatch.estimation.kalman import JointParams, learn_measurement_scale, learn_process_scale
+from gliderwatch.estimation.kalman import (
+    JointParams,
+    JointState,
+    learn_measurement_scale,
+    learn_process_scale,
+)
 from gliderwatch.estimation.kinematic_speed import Ratios, kinematic_speed, vertical
 from gliderwatch.estimation.modes import MODES, Cause, switched
 from gliderwatch.estimation.speed_range import Normal, RangeParams, SpeedRange, speed_range
@@ -180,16 +185,23 @@ class TestPrior:
         assert state.x[OWN] == 0.35
         assert np.sqrt(np.diag(state.cov)[[OWN, SLIP, SIDE]]) == pytest.approx([0.2, 0.014, 0.03])
 
-    def test_the_speed_wanders_by_1_5_cm_s_in_3_hours_and_slip_is_forgotten_in_a_month(self):
+    def after_three_hours(self, slip: float, side: float) -> JointState:
+        """What is expected of a state that was known, before a dive is measured."""
         params = JointParams()
         state = kalman.init(params, EAST.t_dive)
-        state = replace(state, x=readonly([*state.x[:-2], 0.2, 0.1]), cov=readonly(1e-12 * state.cov))
+        state = replace(state, x=readonly([*state.x[:-2], slip, side]), cov=readonly(1e-12 * state.cov))
         seen = observe(EAST)
         passage = kalman._passage(state, seen.start, seen.end, 27.5, params)
-        after = kalman._predicted(state, seen.end, tuple(seen.ground), passage, params)
+        return kalman._predicted(state, seen.end, tuple(seen.ground), passage, params)
+
+    def test_the_speed_wanders_by_1_5_cm_s_in_3_hours_and_slip_is_forgotten_in_a_month(self):
+        after, fades = self.after_three_hours(0.05, 0.11), math.exp(-3 / 24 / 30)
         assert math.sqrt(after.cov[OWN, OWN]) == pytest.approx(0.015, rel=0.01)
-        fades = math.exp(-3 / 24 / 30)
-        assert after.x[[SLIP, SIDE]] == pytest.approx([0.2 * fades, 0.1 * fades])
+        assert after.x[[SLIP, SIDE]] == pytest.approx([0.05 * fades, 0.11 * fades])
+
+    def test_what_no_healthy_glider_has_is_not_forgotten(self):
+        """A lost wing, a bent one: from four standard errors on."""
+        assert self.after_three_hours(0.06, 0.13).x[[SLIP, SIDE]].tolist() == [0.06, 0.13]
 
     def test_three_quarters_of_the_physical_slip_are_real(self):
         """On the first dive nothing else is known of it."""

@@ -12,7 +12,14 @@ from gliderwatch.navigation.dac import Report, new_reports, pair, updated
 from gliderwatch.navigation.dives import Navigation, extend, flight_notes, unsteered, why_unusable
 from gliderwatch.navigation.features import flight_features
 from gliderwatch.navigation.fixes import new_fixes, zeroed
-from gliderwatch.navigation.flight import Flight, downsample, find_flight, lengthened, prepare
+from gliderwatch.navigation.flight import (
+    Flight,
+    _dead_reckoned_headings,
+    downsample,
+    find_flight,
+    lengthened,
+    prepare,
+)
 from gliderwatch.navigation.geodesy import from_plane
 from gliderwatch.navigation.track import build_track, closure
 from missions import LAT, LON, Leg, mission, segment, series
@@ -408,3 +415,25 @@ def test_a_fix_in_a_call_within_half_an_hour_is_of_the_surfacing_of_the_file(lat
     surfaced = Fix(7200.0 + later, LAT, LON)
     call = Call("sim", "log", surfaced.t, surfaced.t + 60.0, surfaced=surfaced)
     assert missing_in_file(file, [call], np.inf).fix == (surfaced if found else None)
+
+
+@pytest.mark.parametrize(
+    ("dt", "speed", "n"),
+    [
+        (9.0, 0.3, 0),
+        (11.0, 0.3, 1),
+        (3500.0, 0.3, 1),
+        (3700.0, 0.3, 0),
+        (600.0, 0.025, 0),
+        (600.0, 0.035, 1),
+        (600.0, 1.4, 1),
+        (600.0, 1.6, 0),
+    ],
+)
+def test_dead_reckoned_positions_tell_a_heading_ten_seconds_to_an_hour_apart_on_a_flight(dt, speed, n):
+    lat, lon = zip((LAT, LON), from_plane((0.0, speed * dt), LAT, LON), strict=True)
+    both = {
+        "dr_lat": Series(readonly([0.0, dt]), readonly(lat)),
+        "dr_lon": Series(readonly([0.0, dt]), readonly(lon)),
+    }
+    assert len(_dead_reckoned_headings(both)[0]) == n

@@ -121,3 +121,13 @@ def test_sql_is_in_the_store_alone() -> None:
 )
 def test_sql_is_seen(source: str, count: int) -> None:
     assert len(statements(source)) == count
+
+
+@pytest.mark.parametrize(
+    "page", sorted((ROOT / "src" / "gliderwatch").glob("*/constants.py")), ids=lambda page: page.parent.name
+)
+def test_each_heuristic_has_one_value(page: Path) -> None:
+    """A name that stands twice on its page silently has the later one."""
+    names = re.findall(r"^([A-Z][A-Z0-9_]*)(?:: .*)? = ", page.read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(names) > 3
+    assert sorted(names) == sorted(set(names))

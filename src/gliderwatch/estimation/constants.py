@@ -87,7 +87,10 @@ that is no normal distribution. Drag and lift, by 10 and 5 % from airframe to ai
 SIDE_ERROR = 0.03
 """rad: standard error of side."""
 SLIP_MEMORY = 30 * 86400.0
-"""s: memory of both."""
+"""s: memory of both,"""
+HEALTHY_BOUND = 4.0
+"""within so many standard errors; beyond, no healthy glider has them, and they last: a wing does not grow
+again (`benchmarks/deployments.py --only usf-stella`: a lost one was forgotten on three weeks of legs)."""
 OWN_NOISE = 0.01
 """Error of W on one dive, as part of it."""
 LEAST_SLIP = -0.1

@@ -15,6 +15,7 @@ from gliderwatch.estimation.constants import (
     FIRST_SPEED,
     FIRST_SPEED_ERROR,
     FRONT,
+    HEALTHY_BOUND,
     LEAST_SLIP,
     LEAST_TESTED,
     MEASUREMENT_SCALES,
@@ -311,17 +312,22 @@ def _predicted(
     state: JointState, end: float, ground: tuple[float, ...], passage: Passage, params: JointParams
 ) -> JointState:
     """The state at the ``end`` (s) of a dive with a velocity over ``ground`` (m/s), before what it
-    measures."""
+    measures.
+
+    Slip and side that a healthy glider may have wander about none. What is beyond that is lost, bent or grown
+    on: it does not come back by itself, however long a leg shows nothing of it.
+    """
     dt = max(end - state.t, 0.0)
     matrix, n = passage_matrix(passage), params.flow.size
-    fades = math.exp(-dt / params.slip_memory)
-    matrix[[SLIP, SIDE], [SLIP, SIDE]] = fades
+    fades, healthy = math.exp(-dt / params.slip_memory), np.array([params.slip_sigma, params.side_sigma])
+    matrix[[SLIP, SIDE], [SLIP, SIDE]] = np.where(
+        np.abs(state.x[[SLIP, SIDE]]) > HEALTHY_BOUND * healthy, 1.0, fades
+    )
     noise = np.zeros_like(state.cov)
     noise[:n, :n] = passage.noise
-    kept = np.square([params.slip_sigma, params.side_sigma]) * (1 - fades**2)
     noise[[OWN, SLIP, SIDE], [OWN, SLIP, SIDE]] = [
         params.speed_wander**2 * dt / (3 * gauss_markov.HOUR),
-        *kept,
+        *np.square(healthy) * (1 - fades**2),
     ]
     before = state.x[: params.flow.size]
     crossed = gauss_markov.crossing(before[0:2] + before[2:4], ground, dt, params.flow)
