@@ -19,6 +19,7 @@ from gliderwatch.estimation.dive_measurement import (
     observe,
     slip_at,
     slip_of,
+    with_thrust,
 )
 from gliderwatch.estimation.glider import speed_params
 from gliderwatch.estimation.healthy_baseline import Baseline, compare
@@ -207,6 +208,17 @@ class TestPrior:
         """On the first dive nothing else is known of it."""
         _, info = kalman.step(None, EAST, JointParams())
         assert info.estimate.slip[0] == pytest.approx(0.75 * slip_at(0.45), abs=0.003)
+
+    def test_a_thruster_takes_from_the_angle_of_attack(self):
+        """0.36 of it adds 0.8 * 0.36 to the square of the speed along the path, 0.6 m/s over cos(pitch)."""
+        driven = replace(EAST.features, thruster=0.36, pitch_dive=-0.42, pitch_climb=0.42)
+        seen = observe(replace(EAST, features=driven))
+        left = 1 - 0.8 * 0.36 / (0.6 / math.cos(0.42)) ** 2
+        assert with_thrust(seen, 0.6).slip == pytest.approx(left * slip_at(0.42), rel=1e-6)
+        assert with_thrust(seen, 0.6).slip_sigma == pytest.approx(0.2 * slip_at(0.42), rel=1e-6)
+        assert with_thrust(seen, 0.4).slip == 0.0
+        sailing = observe(EAST)
+        assert with_thrust(sailing, 0.6) is sailing
 
     def test_bounds_of_what_is_not_known_on_board(self):
         wild = np.array([0.0, 0.0, 3.0, -2.0, 2.0])

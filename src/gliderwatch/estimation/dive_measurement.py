@@ -34,6 +34,8 @@ from gliderwatch.estimation.constants import (
     STRAIGHT,
     SURFACE_FLOW,
     SWING,
+    THRUST,
+    THRUST_ERROR,
     TURNING_ERROR,
     UNEVEN,
     UNSEEN,
@@ -60,9 +62,10 @@ class Observation:
     ``start``, ``end`` (s) of the interval between the fixes; ``ground`` g (m/s, (2,)) with covariance
     ``ground_cov`` ((2, 2)) but for what is wrong with the heading; ``heading`` h ((2,)) with covariance
     ``heading_cov`` ((2, 2)); ``current`` c (m/s, (2,), None: not reported) with standard error
-    ``current_sigma`` a component; ``slip`` the part of W that an angle of attack takes, by physics;
-    ``unseen`` the part of the flight within gaps between headings. ``is_free``: no heading was measured, so
-    that its direction is that of g - c and what is across says nothing.
+    ``current_sigma`` a component; ``slip`` the part of W that an angle of attack takes, by physics, and
+    ``slip_sigma`` how far it is unsure on this dive; ``thrust`` (m2/s2) is what a thruster adds to the square
+    of W, 0 without one; ``unseen`` the part of the flight within gaps between headings. ``is_free``: no
+    heading was measured, so that its direction is that of g - c and what is across says nothing.
     """
 
     start: float
@@ -76,6 +79,8 @@ class Observation:
     slip: float
     unseen: float
     is_free: bool = False
+    slip_sigma: float = 0.0
+    thrust: float = 0.0
 
     @property
     def steadiness(self) -> float:
@@ -170,7 +175,8 @@ def _observed(dive: Dive, track: Track) -> tuple[Observation, float]:
         is_free=_is_free(dive),
         current=None if current is None else readonly([current.u, current.v]),
         current_sigma=math.hypot(error, 2 * GPS_ERROR / interval),
-        slip=_slip(dive),
+        slip=slip_at(_pitch(dive)),
+        thrust=THRUST * (dive.features.thruster or 0.0) * math.cos(_pitch(dive)) ** 2,
         unseen=_unseen(dt[flying]),
     )
     return seen, interval
@@ -273,20 +279,32 @@ def _missing(dive: Dive, interval: float, flown: float) -> Array:
     return np.asarray((missing**2 + (COMPASS_ERROR * flown) ** 2) * np.eye(2))
 
 
-def _slip(dive: Dive) -> float:
-    """The part of depth rate over tan(pitch) that is lost to the angle of attack alpha.
+def _pitch(dive: Dive) -> float:
+    """The mean pitch (rad) of dives and climbs, without sign."""
+    both = (dive.features.pitch_dive, dive.features.pitch_climb)
+    pitches = [abs(pitch) for pitch in both if pitch is not None]
+    return sum(pitches) / len(pitches) if pitches else USUAL_PITCH
+
+
+def slip_at(pitch: float) -> float:
+    """The part of depth rate over tan(pitch) that is lost to the angle of attack alpha, at a pitch (rad).
 
     In a steady glide alpha = C_D / (a tan(theta + alpha)) (Merckelbach et al. 2010), and
     1 - tan(theta) / tan(theta + alpha) = alpha / (sin theta cos theta) to first order.
     """
-    both = (dive.features.pitch_dive, dive.features.pitch_climb)
-    pitches = [abs(pitch) for pitch in both if pitch is not None]
-    return slip_at(sum(pitches) / len(pitches) if pitches else USUAL_PITCH)
-
-
-def slip_at(pitch: float) -> float:
-    """The part of W that the angle of attack takes at a pitch (rad)."""
     return DRAG_BY_LIFT / math.sin(min(max(pitch, FLATTEST_GLIDE), STEEPEST_GLIDE)) ** 2
+
+
+def with_thrust(seen: Observation, own: float) -> Observation:
+    """The numbers of a dive at a speed W ``own`` (m/s), with the slip that is left where a thruster drove.
+
+    Lift balances buoyancy, which is what it was, at a higher speed, so that the angle of attack falls with
+    the square of the speed: to the part of W squared that buoyancy alone would give.
+    """
+    if seen.thrust <= 0:
+        return seen
+    by_buoyancy = 1 - min(seen.thrust / max(own, SLOWEST) ** 2, 1.0)
+    return replace(seen, slip=by_buoyancy * seen.slip, slip_sigma=THRUST_ERROR * seen.slip)
 
 
 def _unseen(dt: Array) -> float:

@@ -43,6 +43,7 @@ from gliderwatch.estimation.dive_measurement import (
     Slipping,
     observe,
     slip_of,
+    with_thrust,
 )
 from gliderwatch.estimation.kinematic_speed import KinematicSpeed
 from gliderwatch.estimation.modes import (
@@ -233,9 +234,12 @@ def step(
         state = init(params, seen.start)
     passage = _passage(state, seen.start, seen.end, dive.start.lat, params)
     state = _predicted(state, seen.end, tuple(seen.ground.tolist()), passage, params)
-    slipping = Slipping(params.slip * seen.slip, math.sqrt(state.tested) * params.own_noise, usual)
-    found = _explained(state, Measured(seen, kinematic, state.tested, slipping), params, hint)
     believed = seen.own_speed()
+    own = believed or ((kinematic.speed, 0.0) if kinematic is not None else (float(state.x[OWN]), 0.0))
+    seen = with_thrust(seen, own[0])
+    noise = math.hypot(math.sqrt(state.tested) * params.own_noise, params.slip * seen.slip_sigma)
+    slipping = Slipping(params.slip * seen.slip, noise, usual)
+    found = _explained(state, Measured(seen, kinematic, state.tested, slipping), params, hint)
     across = _across(state, seen, believed)
     loss, turn, bank = _tested(state, found, passage, params)
     # where no heading was measured, what looks like a step is a turn that was not seen
