@@ -2,9 +2,10 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from gliderwatch.model import Fix, SegmentId
+from gliderwatch.model import Fix, Segment, SegmentId, Series, readonly
 from gliderwatch.navigation.clock import (
     DAY,
     HOUR,
@@ -14,8 +15,10 @@ from gliderwatch.navigation.clock import (
     corrections,
     forward_step,
     is_same,
+    moved,
     numbered,
 )
+from gliderwatch.navigation.flight import downsample
 
 LONG = 3 * HOUR
 PAUSE = 200.0
@@ -124,3 +127,16 @@ def test_a_clock_set_forward_between_two_segments_is_seen():
     assert forward(5.0, name="unit-2023-318-1-5") == 0.0, "another mission"
     assert forward(5.0, fix_after=2 * HOUR) == 0.0, "it may have dived"
     assert forward(5.0, moved=0.1) == 0.0, "11 km in a few minutes: the hours were real"
+
+
+def test_a_segment_at_hand_is_moved_to_what_the_one_that_was_kept_is_moved_to():
+    """By a time that is no whole number of the 30 s over which samples are averaged."""
+    t = 1e9 + np.arange(0.0, 600.0, 20.0)
+    pitch = Series(readonly(t), readonly(np.arange(float(len(t)))))
+    at_hand = Segment(
+        SegmentId(1e9, "unit", "unit-2001-1-1-1"), "m", "sbd", 1e9 + 700, (0, 1, ""), {"pitch": pitch}
+    )
+    kept = replace(at_hand, quantities=downsample(at_hand.quantities))
+    one, other = (moved(each, 15736.0).quantities["pitch"] for each in (at_hand, kept))
+    assert one.t.tolist() == other.t.tolist() == (kept.quantities["pitch"].t + 15736.0).tolist()
+    assert len(one) < len(pitch)

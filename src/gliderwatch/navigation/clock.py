@@ -26,6 +26,7 @@ from gliderwatch.navigation.constants import (
     WILD_SEGMENT,
 )
 from gliderwatch.navigation.fixes import distance
+from gliderwatch.navigation.flight import downsample
 
 HOUR, DAY = 3600.0, 86400.0
 ROLLOVER = 1024 * 7 * DAY
@@ -169,10 +170,15 @@ def _step_back(overlap: float) -> float:
 
 
 def moved(segment: Segment, offset: float) -> Segment:
-    """The segment as if the glider's clock had been ahead by `offset` (s) of what it was, with a note."""
+    """The segment as if the glider's clock had been ahead by `offset` (s) of what it was, with a note.
+
+    Its samples are averaged first, as the state file holds it: which of them are averaged depends on their
+    times, and a segment at hand and the one that was kept must be moved to the same.
+    """
     if not offset:
         return segment
-    held = {name: Series(readonly(s.t + offset), s.v) for name, s in segment.quantities.items()}
+    kept = downsample(segment.quantities)
+    held = {name: Series(readonly(s.t + offset), s.v) for name, s in kept.items()}
     note = f"the glider's clock was {span(offset)} behind: the times of this segment are corrected"
     return replace(
         segment,
