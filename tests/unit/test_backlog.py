@@ -110,14 +110,11 @@ def test_what_is_decoded_at_once_has_its_bounds_but_for_newcomers() -> None:
             backlog.add(job(f"g{n}", opened_at))
     begun = started(backlog, HELD)
     assert len(begun) == HELD and backlog.is_full and backlog.next() is None
-    for one in begun[1:]:
-        assert backlog.left is None  # more is on its way
-        backlog.finish(one, DONE)
-        name = one.header.id.glider
-        assert backlog.ready(name) == [one]  # its turn is later
     backlog.finish(begun[0], DONE)
-    assert backlog.left == "g0"
     assert backlog.ready("g0") == [begun[0]]
+    for one in begun[1:]:
+        backlog.finish(one, DONE)
+        assert backlog.ready(one.header.id.glider) == [one]  # its turn is later
     backlog.add(job("new", 1.0))
     newcomer = backlog.next()
     assert newcomer is not None and newcomer.header.id.glider == "new" and backlog.next() is None
@@ -138,13 +135,11 @@ def test_a_run_waits_for_the_rest_of_its_turn_while_runs_let_go_what_is_held() -
             one = decoding.pop(0)
             backlog.finish(one, DONE)
             glider = one.header.id.glider
-        elif runs:
+        else:
+            assert runs, "it goes on"
             glider = runs.pop(0)
             for _ in backlog.end_run(glider):
                 backlog.decoded(glider)
-        else:
-            assert backlog.left is not None, "it goes on"
-            glider = backlog.left
         found = backlog.ready(glider)
         if len(found) > 1:
             backlog.begin_run(glider, len(found))

@@ -183,6 +183,18 @@ def test_no_heading_is_judged_by_what_the_current_leaves():
         assert Flag.FALSE_ALARM not in flags(verdicts)
 
 
+def flatter_from(first, made):
+    """The dives of some ways, flown at a lower pitch from one of them on, with the depth rates of that."""
+    dives = []
+    for k, (way, each) in enumerate(zip(made, mission(made), strict=True)):
+        pitch = 0.45 if k < first else 0.35
+        rate = way.own * math.tan(pitch)
+        angles = {"pitch_dive": -pitch, "pitch_climb": pitch}
+        rates = {"depth_rate_dive": rate, "depth_rate_climb": -rate}
+        dives.append(replace(each, features=replace(each.features, **angles, **rates)))
+    return dives
+
+
 @pytest.mark.parametrize("own", [0.20, 0.22])
 def test_a_new_way_of_flying_is_seen_by_depth_rate_and_pitch_where_the_way_hides_it(own):
     """Half of the speed is lost for five dives; then it flies flatter, and what the way leaves is half of
@@ -194,14 +206,9 @@ def test_a_new_way_of_flying_is_seen_by_depth_rate_and_pitch_where_the_way_hides
         replace(way, speed=0.92 * own, own=own, wrong=tuple(wrong))
         for way, wrong in zip(made[20:], hidden[20:].tolist(), strict=True)
     ]
-    dives = []
-    for k, (way, each) in enumerate(zip(made, mission(made), strict=True)):
-        pitch = 0.45 if k < 20 else 0.35
-        rate = way.own * math.tan(pitch)
-        angles = {"pitch_dive": -pitch, "pitch_climb": pitch}
-        rates = {"depth_rate_dive": rate, "depth_rate_climb": -rate}
-        dives.append(replace(each, features=replace(each.features, heading_reckoned=True, **angles, **rates)))
-    _, verdicts = run(dives)
+    dives = flatter_from(20, made)
+    blind = [replace(each, features=replace(each.features, heading_reckoned=True)) for each in dives]
+    _, verdicts = run(blind)
     assert flags(verdicts[16:20]) == [Flag.ANOMALY] * 4
     assert flags(verdicts[20:23]) == [None, None, Flag.NORMAL]
     assert "flies in a new way" in verdicts[22].reason
@@ -215,14 +222,7 @@ def test_a_change_of_pitch_explains_no_loss_of_two_fifths_of_the_speed(part, is_
     """The pilot has it fly flatter, and all measurements agree on a lower speed."""
     made = ways(30, 3, lambda k: 0.7 * (k // 5))
     made[20:] = [replace(way, speed=part * way.speed, own=part * way.own) for way in made[20:]]
-    dives = []
-    for k, (way, each) in enumerate(zip(made, mission(made), strict=True)):
-        pitch = 0.45 if k < 20 else 0.35
-        rate = way.own * math.tan(pitch)
-        angles = {"pitch_dive": -pitch, "pitch_climb": pitch}
-        rates = {"depth_rate_dive": rate, "depth_rate_climb": -rate}
-        dives.append(replace(each, features=replace(each.features, **angles, **rates)))
-    _, verdicts = run(dives)
+    _, verdicts = run(flatter_from(20, made))
     assert any("flies in a new way" in verdict.reason for verdict in verdicts) == is_new_way
     assert set(flags(verdicts[26:])) == {Flag.NORMAL if is_new_way else Flag.ANOMALY}
 

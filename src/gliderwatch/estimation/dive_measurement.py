@@ -155,6 +155,7 @@ def _observed(dive: Dive, track: Track) -> tuple[Observation, float]:
     error = REPORTED if current is None or current.final else PROVISIONAL
     heading = share @ vectors
     along = heading / max(float(np.hypot(*heading)), 1e-6)
+    pitch = _pitch(dive)
     seen = Observation(
         start=float(track.t[0]),
         end=float(track.t[-1]),
@@ -175,8 +176,8 @@ def _observed(dive: Dive, track: Track) -> tuple[Observation, float]:
         is_free=_is_free(dive),
         current=None if current is None else readonly([current.u, current.v]),
         current_sigma=math.hypot(error, 2 * GPS_ERROR / interval),
-        slip=slip_at(_pitch(dive)),
-        thrust=THRUST * (dive.features.thruster or 0.0) * math.cos(_pitch(dive)) ** 2,
+        slip=slip_at(pitch),
+        thrust=THRUST * (dive.features.thruster or 0.0) * math.cos(pitch) ** 2,
         unseen=_unseen(dt[flying]),
     )
     return seen, interval

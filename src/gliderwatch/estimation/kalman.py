@@ -235,8 +235,11 @@ def step(
     passage = _passage(state, seen.start, seen.end, dive.start.lat, params)
     state = _predicted(state, seen.end, tuple(seen.ground.tolist()), passage, params)
     believed = seen.own_speed()
-    own = believed or ((kinematic.speed, 0.0) if kinematic is not None else (float(state.x[OWN]), 0.0))
-    seen = with_thrust(seen, own[0])
+    if believed is not None:
+        own = believed[0]
+    else:
+        own = float(state.x[OWN]) if kinematic is None else kinematic.speed
+    seen = with_thrust(seen, own)
     noise = math.hypot(math.sqrt(state.tested) * params.own_noise, params.slip * seen.slip_sigma)
     slipping = Slipping(params.slip * seen.slip, noise, usual)
     found = _explained(state, Measured(seen, kinematic, state.tested, slipping), params, hint)

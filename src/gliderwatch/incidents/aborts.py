@@ -106,10 +106,12 @@ def _of_happened(happened: Happened) -> AbortReport:
 def _is_same(one: AbortReport, other: AbortReport) -> bool:
     """Whether two reports are of one abort. A history may leave out when it was, so that it has the time of
     the call that printed it: then it is the last one before, of the same cause."""
-    if one.what == other.what and one.is_history != other.is_history and one.cause == other.cause:
+    if one.what != other.what:
+        return False
+    if one.is_history != other.is_history and one.cause == other.cause:
         history, itself = (one, other) if one.is_history else (other, one)
         return itself.t <= history.t + SAME_ABORT
-    return one.what == other.what and abs(one.t - other.t) <= SAME_ABORT
+    return abs(one.t - other.t) <= SAME_ABORT
 
 
 def announce(

@@ -96,19 +96,9 @@ class Backlog:
         most = RUN if self._is_long else 1
         found = list(islice(takewhile(lambda job: job.result is not None, queue.decoding), most))
         is_its_turn = bool(queue.waiting) and next(iter(self._queues)) == glider
-        is_more_to_come = self._is_at_work and (len(found) < len(queue.decoding) or is_its_turn)
+        is_fed = not self.is_full or self.running > 0  # a run that ends lets go of its files
+        is_more_to_come = len(found) < len(queue.decoding) or (is_its_turn and is_fed)
         return [] if len(found) < most and is_more_to_come and self.behind(glider) >= FEWEST else found
-
-    @property
-    def _is_at_work(self) -> bool:
-        return bool(self.decoding or self.running)
-
-    @property
-    def left(self) -> str | None:
-        """A glider whose decoded files wait for more of its own that cannot be decoded: too many are held,
-        and nothing is at work any more that would let some go."""
-        at_rest = () if self._is_at_work else self._queues.items()
-        return next((glider for glider, queue in at_rest if queue.decoding), None)
 
     def begin_run(self, glider: str, files: int) -> None:
         """The next files of a glider are being processed."""

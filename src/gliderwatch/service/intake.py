@@ -209,7 +209,7 @@ class Intake:
         self._upkeep.decoded(news.job)
         backlog.finish(news.job, news.outcome)
         self._go_on(news.job.header.id.glider)
-        self._feed()
+        self._runtime.feed()
 
     def _go_on(self, glider: str) -> None:
         """Take the next files of a glider that are decoded: many in a run, by a worker, else each at once."""
@@ -292,15 +292,7 @@ class Intake:
             for job in jobs:
                 job.is_alone = True  # which of them it was shows when each is processed by itself
         self._go_on(glider)
-        self._feed()
-
-    def _feed(self) -> None:
-        """Have more files decoded; where no more may be, as they are held by gliders that wait for more of
-        theirs, take those of one."""
         self._runtime.feed()
-        if (glider := self._runtime.backlog.left) is not None:
-            self._go_on(glider)
-            self._runtime.feed()
 
     def _commit(self, glider: str, jobs: Sequence[Job], done: Processed) -> None:
         """Commit the outcomes of a run; where they do not hold any more, each file is processed again."""

@@ -202,7 +202,7 @@ def parse_header(data: bytes, *, science: bool = False) -> Header:
     return Header(
         id=SegmentId(_opened_at(tags["fileopen_time"]), sys.intern(glider), full_name),
         mission=sys.intern(tags["mission_name"].lower()),  # one of a hundred thousand files that say so
-        kind=sys.intern(kind),
+        kind=kind,
         crc=sys.intern(tags["sensor_list_crc"].lower()),
         factored=tags["sensor_list_factored"] == "1",
         n_sensors=n_sensors,
