@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import socket
 import subprocess
 import tempfile
@@ -30,6 +31,8 @@ from acceptance.support import (
 from gliderwatch.simulate.delivery import write_mission
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
+
+ROOT = Path(__file__).resolve().parents[2]
 
 DAY = 86400.0
 SECRET = "Pässwort €5"
@@ -161,8 +164,13 @@ def test_the_cure_of_a_closed_cache_is_no_privilege() -> None:
         config.chmod(0o644)
         site.root.chmod(0o755)
         site.cache.chmod(0o700)
+        for part in (
+            "src",
+            "config",
+        ):  # a checkout below /root is closed to others, and presets are read late
+            shutil.copytree(ROOT / part, Path(folder) / part)
         words = [GLIDERWATCH.with_name("python"), "-c", AS_NOBODY, config]
-        env = os.environ | {"COLUMNS": "200"}
+        env = os.environ | {"COLUMNS": "200", "PYTHONPATH": str(Path(folder) / "src")}
         found = subprocess.run(words, env=env, capture_output=True, text=True, check=False)
     text = "".join(found.stdout.split())
     assert f"{site.cache}(root:root,mode0700)isclosedtonobody" in text, found.stdout
