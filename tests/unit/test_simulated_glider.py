@@ -9,6 +9,7 @@ from scipy.signal import find_peaks
 from gliderwatch.simulate.flight import (
     Airframe,
     Point,
+    Vector,
     displacement,
     nmea,
     offset,
@@ -20,6 +21,7 @@ from gliderwatch.simulate.glider import simulate, voyage
 from gliderwatch.simulate.ocean import Constituent, Ellipse, Sea, make_ocean
 from gliderwatch.simulate.scenario import FixIn, Scenario
 from gliderwatch.simulate.vehicle import Yo
+from gliderwatch.slocum.sensors import model_declination
 from simulated import DAY, EVERY_CYCLE, STRAIGHT, closures, degrees, samples
 
 # --------------------------------------------------------------------------- closure
@@ -43,6 +45,20 @@ def test_files_close_to_the_noise(fix_in: FixIn) -> None:
 def test_files_close_with_and_without_variation(variation: float) -> None:
     found = closures(simulate(replace(STRAIGHT, variation=variation)), variation)
     assert np.median([dive.misfit for dive in found]) < 1e-3
+
+
+def test_the_variation_follows_the_way() -> None:
+    """A current of 1.5 m/s carries the glider 500 km in four days, over two degrees of declination."""
+    carried = replace(STRAIGHT, days=4.0, sea=Sea(residual=Vector(1.5, 0.0), tides=()))
+    mission = simulate(carried)
+    _, sent = samples(mission, "m_gps_mag_var")
+    end = mission.truth[-2].end  # the last dive was reckoned from there
+    there, here = (model_declination(*place, carried.start)[0] for place in (end, carried.place))
+    assert abs(there - here) > 0.03
+    assert sent[0] == pytest.approx(carried.variation, abs=1e-4)
+    assert sent[-1] == pytest.approx(carried.variation - (there - here), abs=1e-3)
+    found = closures(mission, float(sent[-1]))
+    assert found[-1].misfit < 5e-3 < found[0].misfit
 
 
 def test_the_noise_of_fixes_goes_into_the_current_and_not_into_the_closure() -> None:

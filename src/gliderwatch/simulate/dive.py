@@ -50,7 +50,7 @@ def steer(glider: Glider, believed: Array) -> Course:
     scenario, step = glider.scenario, CYCLE * NODE
     memory = np.exp(-step / _HEADING_MEMORY)
     kicks = scenario.heading_sigma * glider.rng.standard_normal(-(-len(believed) // NODE) + 1)
-    water = turn(glider.water, -scenario.variation)
+    water = turn(glider.water, -glider.variation)
     adrift = CYCLE * (glider.cycle - glider.fix_cycle)
     east, north, error = water.east * adrift, water.north * adrift, float(kicks[0])
     goals = [displacement(glider.fix, waypoint) for waypoint in scenario.waypoints]
@@ -164,7 +164,7 @@ def _log_position(glider: Glider, cycles: Cycles, reckoning: Reckoning) -> None:
     adrift = CYCLE * (cycles - glider.fix_cycle)
     east = reckoning.east + glider.water.east * adrift
     north = reckoning.north + glider.water.north * adrift
-    c, s = np.cos(glider.scenario.variation), np.sin(glider.scenario.variation)
+    c, s = np.cos(glider.variation), np.sin(glider.variation)
     lat, lon = offset(glider.fix, c * east - s * north, c * north + s * east)
     log.add("m_lat", cycles, nmea(lat))
     log.add("m_lon", cycles, nmea(lon))
@@ -181,7 +181,7 @@ def _log_steering(glider: Glider, nodes: Cycles, course: Course) -> None:
     log.add("c_wpt_lon", nodes, nmea(goals[:, 1]))
     log.add("c_wpt_x_lmc", nodes, local[:, 0])
     log.add("c_wpt_y_lmc", nodes, local[:, 1])
-    log.add("c_heading", nodes, _round_the_circle(course.commanded + scenario.variation))
+    log.add("c_heading", nodes, _round_the_circle(course.commanded + glider.variation))
     # A wing that is gone turns the glider: the fin holds against it.
     pull = 0.4 * glider.health.roll(glider.times(nodes))
     fin = course.commanded - course.kept - pull + 0.02 * glider.luck.standard_normal(len(nodes))
@@ -264,6 +264,7 @@ def dive(glider: Glider, segment: str) -> Flown:
     scenario, rng, start = glider.scenario, glider.rng, glider.cycle
     _face_the_stream(glider)
     glider.wander_trim()
+    glider.find_north()
     motion = fly(glider)
     n = len(motion.depth)
     t = glider.times(start + np.arange(n))
@@ -272,7 +273,7 @@ def dive(glider: Glider, segment: str) -> Flown:
     believed = own_speed(depth, pitch, CYCLE) * _allowance(scenario)
     course = steer(glider, believed)
     kept = np.interp(np.arange(n), NODE * np.arange(len(course.kept)), np.unwrap(course.kept))
-    compass = kept + scenario.variation + _COMPASS_NOISE * rng.standard_normal(n)
+    compass = kept + glider.variation + _COMPASS_NOISE * rng.standard_normal(n)
     reckoning = Reckoning(depth, pitch, compass, believed, *along_heading(believed, compass, CYCLE))
     log_dive(glider, motion, course, reckoning)
     east, north = along_heading(motion.speed, kept - glider.health.compass(t), CYCLE)

@@ -223,7 +223,7 @@ class Scenario:
     """A mission to simulate.
 
     ``start`` (s since 1970) and ``days``; ``place`` of launch and ``waypoints``, gone to in turn;
-    ``variation`` is m_gps_mag_var (rad, west positive). ``pitch`` (rad) of each leg is normal with
+    ``variation`` is m_gps_mag_var at launch (rad, west positive). ``pitch`` (rad) of each leg is normal with
     ``pitch_sigma``; ``drive`` is the volume moved from neutral (m^3), of which the
     water makes more or less by the part ``drive_sigma``, wandering within a day; ``allowed`` is the part of
     the loss by the angle of attack that the glider allows for when it reckons; ``depths`` (m) are the upper

@@ -193,7 +193,7 @@ def _reckon(glider: Glider, flown: Flown, plan: Plan, fixes: Fixes, drifted: Vec
     reports.append(("final", plan.last, under, CYCLE * (flown.end - flown.start)))
     garbage = plan.restart and glider.luck.random() < glider.scenario.rates.dac_garbage
     for kind, cycle, made, duration in reports:
-        magnetic = turn(made, glider.scenario.variation)
+        magnetic = turn(made, glider.variation)
         water = Vector(
             (magnetic.east - flown.own.east) / duration, (magnetic.north - flown.own.north) / duration
         )
@@ -206,7 +206,7 @@ def _reckon(glider: Glider, flown: Flown, plan: Plan, fixes: Fixes, drifted: Vec
     named = {"stale_fix": plan.stale, "restart": plan.restart, "dac_garbage": garbage}
     return replace(
         flown.truth,
-        reported=turn(glider.water, -glider.scenario.variation),
+        reported=turn(glider.water, -glider.variation),
         artefacts=tuple(name for name, there in named.items() if there),
     )
 
@@ -237,7 +237,7 @@ def _log(glider: Glider, plan: Plan, fixes: Fixes, shared: Fixes) -> None:
     log.add("m_y_lmc", shared.cycles[-1], place.north)
     log.add("m_gps_status", [plan.up, *files], 2)
     log.add("m_gps_status", fixes.cycles, np.where(fresh, 0, 1))
-    log.add("m_gps_mag_var", fixes.cycles, glider.scenario.variation)
+    log.add("m_gps_mag_var", fixes.cycles, glider.variation)
     states = (plan.up, DR_AWAITING_FIX), (int(shared.cycles[0]), DR_AWAITING_POSTFIX)
     for cycle, state in (*states, (plan.last, DR_AWAITING_DIVE)):
         log.add("x_dr_state", cycle, state)

@@ -16,6 +16,7 @@ from gliderwatch.simulate.flight import Glide, Point, Vector, displacement, offs
 from gliderwatch.simulate.ocean import Ocean
 from gliderwatch.simulate.scenario import DiveTruth, Health, Scenario
 from gliderwatch.simulate.telemetry import CYCLE, Log
+from gliderwatch.slocum.sensors import model_declination
 
 # ----------------------------------------
 # Where a simulated glider is, and where it believes to be, as a mission goes on.
@@ -44,9 +45,9 @@ class Glider:
     (m/s, magnetic north) the current it reckons with; ``waypoint`` the index of its goal; ``lmc`` the
     origin of its local mission coordinates. ``against`` (unit vector) is the way of the current that
     sets against it; ``inflections`` counts, ``charge`` (A h) is used up; ``trim`` is what the water adds to
-    its drive, in units of `Scenario.drive_sigma`. ``rng`` moves the glider,
-    ``luck`` all that came to be simulated later, so that neither disturbs the other. ``yos`` are flown one
-    after another in each dive, the last without an end; none: to the depths of the scenario.
+    its drive, in units of `Scenario.drive_sigma`; ``variation`` is m_gps_mag_var (rad). ``rng`` moves the
+    glider, ``luck`` all that came to be simulated later, so that neither disturbs the other. ``yos`` are
+    flown one after another in each dive, the last without an end; none: to the depths of the scenario.
     """
 
     scenario: Scenario
@@ -71,18 +72,27 @@ class Glider:
     trim: float = 0.0
     yos: tuple[Yo, ...] = ()
     health: Health = field(init=False)
+    variation: float = field(init=False)
     trimming: np.random.Generator = field(init=False)
     timing: np.random.Generator = field(init=False)
 
     def __post_init__(self) -> None:
         self.health, self.trimming = self.scenario.health, self.scenario.rng(4)
         self.timing = self.scenario.rng(5)
+        self.variation = self.scenario.variation
         self.trim = float(self.trimming.standard_normal())
 
     def wander_trim(self) -> None:
         """Let ``trim`` wander by the time of a dive."""
         kept = exp(-self.scenario.interval / _TRIM_MEMORY)
         self.trim = kept * self.trim + sqrt(1 - kept**2) * float(self.trimming.standard_normal())
+
+    def find_north(self) -> None:
+        """Take the ``variation`` of the last fix: it changes along the way as the World Magnetic Model has
+        it."""
+        s, t = self.scenario, self.time(self.cycle)
+        changed = model_declination(*self.fix, t)[0] - model_declination(*s.place, s.start)[0]
+        self.variation = s.variation - changed
 
     def turns(self) -> Iterator[tuple[float, float]]:
         """Upper and lower turn (m) of each leg of a dive, without end."""
@@ -125,7 +135,7 @@ class Glider:
 
     def to_lmc(self, place: Point) -> Vector:
         """Local mission coordinates (m, magnetic north) of a place."""
-        return turn(displacement(self.lmc, place), self.scenario.variation)
+        return turn(displacement(self.lmc, place), self.variation)
 
 
 class Flown(NamedTuple):
@@ -189,7 +199,7 @@ class _Way:
         goal = displacement(glider.fix, scenario.waypoints[glider.waypoint])
         away = hypot(goal.east, goal.north) or 1.0
         ahead = steady_glide(scenario.pitch, scenario.drive, scenario.airframe).horizontal
-        water = turn(glider.water, -scenario.variation)
+        water = turn(glider.water, -glider.variation)
         self._velocity = Vector(
             ahead * goal.east / away + water.east, ahead * goal.north / away + water.north
         )
