@@ -61,6 +61,16 @@ class TestIncidents:
         (found,) = World({one.t_dive: one for one in made}).incidents()
         assert (found.cleared_at is not None) == cleared
 
+    @pytest.mark.parametrize(
+        "speed, sigma, cleared", [(0.24, 0.035, True), (0.24, 0.045, False), (0.301, 0.5, True)]
+    )
+    def test_it_is_over_by_a_standard_error_or_at_the_usual_speed(self, speed, sigma, cleared):
+        numbers = {**SLOW.evidence, "usual_speed": 0.3, "speed_sigma": sigma}
+        again = {"speed": speed, "speed_min": 0.2, "evidence": numbers}
+        made = [dive(k, "1") for k in range(3)] + [dive(k, "0", **again) for k in range(3, 8)]
+        (found,) = World({one.t_dive: one for one in made}).incidents()
+        assert (found.cleared_at is not None) == cleared
+
     @pytest.mark.parametrize("slower, holds", [(0.04, True), (0.055, False)])
     def test_an_anomaly_has_grown_worse_by_5_cm_s(self, slower, holds):
         ack = acknowledge(incident(replace(SLOW, speed=0.19, speed_min=0.2)), "ann", "", T0)

@@ -99,13 +99,13 @@ def advance(
 
 def _says_of_anomaly(dive: Assessment, is_open: bool) -> bool | None:
     """Whether a dive is flagged (None: it says neither). An open anomaly is cleared by dives near the usual
-    speed: one just inside the bound is not well again."""
+    speed: one just inside the bound, or by less than its standard error, is not well again."""
     if dive.flag == Flag.FALSE_ALARM:
         return None
     usual, speed = dive.usual_speed, dive.speed
     if is_open and dive.flag == Flag.NORMAL and usual is not None and speed is not None:
-        near = dive.speed_min + WELL * (usual - dive.speed_min)
-        return None if speed < near else False
+        inside = max(WELL * (usual - dive.speed_min), dive.speed_sigma or 0.0)
+        return None if speed < min(dive.speed_min + inside, usual) else False
     return dive.flag == Flag.ANOMALY
 
 
