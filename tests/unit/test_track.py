@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gliderwatch.model import Current, Fix, Track
-from gliderwatch.navigation.features import evidence, track_features
+from gliderwatch.navigation.features import evidence, flight_features, track_features
 from gliderwatch.navigation.flight import Flight
 from gliderwatch.navigation.geodesy import from_plane, to_plane
 from gliderwatch.navigation.track import build_track, closure, mean_heading
@@ -183,6 +183,15 @@ def test_evidence_of_a_dive():
     assert (out.depth_rate_dive, out.depth_rate_climb) == pytest.approx((0.1, -0.1))
     assert out.onboard_speed == pytest.approx(0.33)
     assert np.isfinite(list(evidence(out).values())).all()
+
+
+def test_the_pitch_is_that_of_the_glide_and_not_of_its_turns():
+    """On short yos a third of the samples is of turns: their mean pitch would be that of a flatter glide."""
+    yo = [-0.45] * 6 + [-0.3, -0.21, 0.0, 0.21, 0.3] + [0.4] * 6 + [0.25, 0.0, -0.25]
+    times = np.linspace(FLIGHT.start, FLIGHT.end, 10 * len(yo))
+    samples = steady(60.0) | {"pitch": series([(t, yo[k % len(yo)]) for k, t in enumerate(times)])}
+    found = flight_features(samples, FLIGHT)
+    assert (found.pitch_dive, found.pitch_climb) == pytest.approx((-0.45, 0.4))
 
 
 def test_depth_near_the_surface_alone_is_no_depth_of_the_dive():

@@ -99,8 +99,8 @@ def flight_features(samples: Samples, flight: Flight) -> DiveFeatures:
     return DiveFeatures(
         duration=flight.end - flight.start,
         depth_max=float(depth.v.max()) if well_sampled else None,
-        pitch_dive=float(np.mean(dives)) if len(dives) else None,
-        pitch_climb=float(np.mean(climbs)) if len(climbs) else None,
+        pitch_dive=_median(dives.tolist(), 1),
+        pitch_climb=_median(climbs.tolist(), 1),
         roll_mean=float(np.mean(roll.v)) if len(roll) else None,
         roll_std=float(np.std(roll.v)) if len(roll) else None,
         onboard_speed=float(np.mean(speed.v)) if len(speed) else None,
