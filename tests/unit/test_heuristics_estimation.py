@@ -31,6 +31,7 @@ from gliderwatch.estimation.kalman import (
     learn_process_scale,
 )
 from gliderwatch.estimation.kinematic_speed import Ratios, kinematic_speed, vertical
+from gliderwatch.estimation.kinematic_speed import learn as learn_ratios
 from gliderwatch.estimation.modes import MODES, Cause, switched
 from gliderwatch.estimation.speed_range import Normal, RangeParams, SpeedRange, speed_range
 from gliderwatch.estimation.step_test import Bank, Update, ratio_bound, steps
@@ -49,6 +50,7 @@ from gliderwatch.navigation.geodesy import from_plane
 from gliderwatch.papers.learner import init
 from gliderwatch.params import GliderParams
 from gliderwatch.sea.ocean_field import Field
+from gliderwatch.simulate.flight import Airframe, steady_glide
 from joint_support import HOUR, Way, dive, mission
 
 EAST = dive(0, Way(heading=0.0, speed=0.25))
@@ -104,7 +106,7 @@ class TestMeasurement:
         ("known", "along", "length"),
         [
             ({"heading_reckoned": True}, 0.03, 1.0),
-            ({"heading_commanded": 3 * HOUR}, 0.1, 1.0),
+            ({"heading_commanded": 3 * HOUR}, 0.03, 1.0),
             ({"heading_assumed": True}, 0.2, 0.92),
         ],
     )
@@ -121,15 +123,32 @@ class TestMeasurement:
             error, rel=0.02
         )
 
-    @pytest.mark.parametrize(("apart", "error"), [(0.8, 0.1), (1.1, 0.5)])
+    @pytest.mark.parametrize(("apart", "error"), [(0.8, 0.03), (1.1, 0.5)])
     def test_few_commanded_headings_that_differ_tell_of_turns(self, apart, error):
         """Mean of two headings 0.8 rad apart: 0.92 long, straight; of 1.1 rad: 0.85, it turned."""
         turned = known_by(dive(0, Way(heading=(0.0, apart))), heading_commanded=3 * HOUR)
-        assert heading_sigmas(turned)[1] == pytest.approx(error, rel=0.05)
+        assert heading_sigmas(turned)[1] == pytest.approx(math.hypot(error, 0.02), rel=0.05)
 
-    def test_slip_is_that_of_the_flight_model(self):
-        """Merckelbach et al. (2019): C_D0 0.15, a 7.5 1/rad; between 17 and 57 degrees of pitch."""
-        assert slip_at(0.45) == pytest.approx(0.15 / 7.5 / math.sin(0.45) ** 2)
+    @pytest.mark.parametrize(
+        ("known", "chance"),
+        [
+            ({}, 0.0),
+            ({"heading_commanded": 1.0}, 0.1),
+            ({"heading_reckoned": True}, 0.0),
+            ({"heading_assumed": True}, 0.0),
+        ],
+    )
+    def test_a_glider_may_turn_where_commanded_headings_alone_are_sent(self, known, chance):
+        assert observe(known_by(EAST, **known)).turning == chance
+        assert observe(replace(known_by(EAST, **known), current=None)).turning == 0.0
+
+    @pytest.mark.parametrize("pitch", [0.3, 0.45, 0.6, 1.0])
+    def test_slip_is_that_of_the_flight_model(self, pitch):
+        """Merckelbach et al. (2010, 2019): C_D0 0.15, C_D1 10.5 1/rad2, a 7.5 1/rad; 17 to 57 degrees."""
+        path = pitch + steady_glide(pitch, 150e-6, Airframe()).attack
+        assert slip_at(pitch) == pytest.approx(1 - math.tan(pitch) / math.tan(path), rel=1e-4)
+
+    def test_slip_outside_of_the_model(self):
         assert slip_at(0.2) == slip_at(0.3) > slip_at(0.31)
         assert slip_at(1.2) == slip_at(1.0) < slip_at(0.99)
         assert observe(known_by(EAST, pitch_dive=None, pitch_climb=None)).slip == slip_at(0.45)
@@ -273,6 +292,14 @@ class TestModes:
         assert after[Cause.CURRENT] == pytest.approx(0.6)
         assert sum(after.values()) == pytest.approx(1.0)
 
+    def test_an_unseen_turn_makes_the_ground_velocity_wrong(self):
+        chance = {m.cause: m.chance for m in switched(MODES, {Cause.GROUND: 0.1}, turning=0.1)}
+        assert chance[Cause.GROUND] == pytest.approx(0.1)
+        assert chance[Cause.CURRENT] == 0.02
+        assert sum(chance.values()) == pytest.approx(1.0)
+        again = {m.cause: m.chance for m in switched(MODES, {Cause.GROUND: 1.0}, turning=0.1)}
+        assert again[Cause.GROUND] == pytest.approx(0.6)
+
 
 class TestSteps:
     def test_the_bound_is_that_which_was_measured(self):
@@ -280,6 +307,14 @@ class TestSteps:
         assert ratio_bound(0.5) == 10.0
         assert ratio_bound(0.5 / math.e) == pytest.approx(14.0)
         assert ratio_bound(1.0) == ratio_bound(0.5) < ratio_bound(0.45)
+
+    @pytest.mark.parametrize(("roll", "stays"), [(0.04, True), (-0.04, True), (0.06, False), (None, False)])
+    def test_a_roll_within_a_twentieth_of_a_radian_is_as_before(self, roll, stays, monkeypatch):
+        asked = []
+        monkeypatch.setattr(verdict.kalman, "step", lambda *given: asked.append(given[-1]) or (None, None))
+        rolling = replace(EAST, features=replace(EAST.features, roll_mean=roll))
+        verdict.step(SpeedState(rolls=(0.0,) * 5), rolling, speed_params(GliderParams()))
+        assert asked == [stays]
 
 
 class TestKinematicSpeed:
@@ -306,9 +341,20 @@ class TestKinematicSpeed:
         assert (vertical(features) is not None) == tells
 
     @pytest.mark.parametrize(("minutes", "tells"), [(59, False), (61, True)])
-    def test_a_dive_below_an_hour_tells_nothing(self, minutes, tells):
+    def test_the_glider_s_own_mean_tells_nothing_below_an_hour(self, minutes, tells):
         features = DiveFeatures(60.0 * minutes, onboard_speed=0.25)
         assert (kinematic_speed(Ratios(onboard=(1.0,) * 3), features) is not None) == tells
+
+    @pytest.mark.parametrize(("minutes", "tells"), [(29, False), (31, True)])
+    def test_depth_rate_tells_nothing_below_half_an_hour(self, minutes, tells):
+        features = DiveFeatures(60.0 * minutes, pitch_dive=-0.45, pitch_climb=0.45)
+        features = replace(features, depth_rate_dive=0.14, depth_rate_climb=-0.14)
+        assert (kinematic_speed(Ratios(), features) is not None) == tells
+
+    @pytest.mark.parametrize(("minutes", "teaches"), [(59, False), (61, True)])
+    def test_an_hour_teaches_the_ratio(self, minutes, teaches):
+        features = DiveFeatures(60.0 * minutes, onboard_speed=0.25)
+        assert (learn_ratios(Ratios(), features, 0.25) != Ratios()) == teaches
 
 
 class TestNormal:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from gliderwatch.estimation import kalman
-from gliderwatch.estimation.dive_measurement import observe
+from gliderwatch.estimation.dive_measurement import observe, slip_at
 from gliderwatch.estimation.kalman import JointParams, step
 from gliderwatch.estimation.modes import MODES, ROLLED, Cause
 from gliderwatch.model import readonly
@@ -35,7 +35,7 @@ def test_observation_of_a_straight_dive():
     assert seen.current == pytest.approx([0.05, -0.05])  # what the glider over-rates itself by is in it
     assert seen.own_speed()[0] == pytest.approx(0.25)
     assert seen.across(0.25)[0] == pytest.approx(0.0, abs=1e-12)
-    assert seen.slip == pytest.approx(0.02 / math.sin(0.45) ** 2)
+    assert seen.slip == slip_at(0.45)
 
 
 def test_across_is_left_positive():
@@ -168,7 +168,7 @@ def test_healthy_mission_is_estimated_with_a_true_uncertainty():
     speed, flow = [], []
     for seed in range(12):
         rng = np.random.default_rng(seed)
-        slip = 0.75 * 0.02 / math.sin(0.45) ** 2 + PARAMS.slip_sigma * rng.standard_normal()
+        slip = 0.75 * slip_at(0.45) + PARAMS.slip_sigma * rng.standard_normal()
         made = ways(40, seed, lambda k: 2.1 * (k // 5), speed=0.25 * (1 - slip))
         _, infos = run(mission(made))
         for way, info in zip(made[8:], infos[8:], strict=True):

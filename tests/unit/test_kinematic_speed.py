@@ -155,9 +155,9 @@ def test_speed_that_cannot_be_tells_nothing_and_teaches_nothing(speed):
 
 def test_short_dive_tells_nothing_and_teaches_nothing():
     """Its turns and the surface take too much of the time."""
-    short = replace(telling_dive(0.25), duration=0.9 * HOUR)
+    short = replace(telling_dive(0.25), duration=0.4 * HOUR)
     assert kinematic_speed(Ratios(), short) is None
-    assert learn(Ratios(), short, 0.25) == Ratios()
+    assert learn(Ratios(), replace(short, duration=0.9 * HOUR), 0.25) == Ratios()
 
 
 # --------------------------------------------------------------------------- in the estimator

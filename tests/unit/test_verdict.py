@@ -92,6 +92,28 @@ def test_roll_alone_is_no_anomaly():
     assert Flag.ANOMALY not in flags(verdicts)
 
 
+@pytest.mark.parametrize(("part", "learns"), [(0.10, True), (0.145, False)])
+def test_a_dive_that_may_be_slow_teaches_nothing(part, learns):
+    """The range ends 15 % below the usual speed. A dive just beyond is not surely slow, nor surely well."""
+    made = ways(21, 8, lambda k: 0.7 * (k // 5))
+    dives = mission([w if k < 20 else slower(w, part) for k, w in enumerate(made)])
+    before, _ = run(dives[:-1])
+    after, verdicts = run(dives)
+    assert verdicts[-1].flag is Flag.NORMAL
+    assert len(after.normal.speeds) - len(before.normal.speeds) == learns
+
+
+def test_a_turn_that_no_heading_shows_is_no_wrong_current():
+    """The commanded headings say that it went straight on, and the way is half of what it should be."""
+    made = [slower(w, 0.5) if k == 15 else w for k, w in enumerate(ways(16, 9, lambda k: 0.3))]
+    features = {"heading_commanded": 1.0}
+    dives = [replace(d, features=replace(d.features, **features)) for d in mission(made)]
+    _, verdicts = run(dives)
+    assert set(flags(verdicts[:15])) == {Flag.NORMAL}
+    assert verdicts[15].flag is None
+    assert "turned" in verdicts[15].reason
+
+
 def test_turned_compass_is_flag_2():
     made = ways(60, 7, lambda k: 1.6 * (k // 3))
     _, verdicts = run(mission([w if k < 20 else replace(w, turned=0.9) for k, w in enumerate(made)]))
@@ -116,19 +138,29 @@ def test_dive_without_track_keeps_its_reason():
     assert (verdict.flag, verdict.reason, verdict.info) == (None, "stale fix", None)
 
 
+def half_unseen(dive):
+    """Without the headings of its second half."""
+    track = dive.track
+    t = np.concatenate([track.t[:13], track.t[-1:]])
+    x = readonly(track.x[[*range(13), -1]])
+    return replace(dive, track=replace(track, t=readonly(t), x=x, heading=track.heading[:13]))
+
+
 def test_slow_dive_with_unseen_headings_waits_for_the_next():
     """george-2024: the glider turned back in the second half of a dive of which no heading was sent."""
     made = ways(16, 8, lambda k: 0.3)
     dives = mission([w if k < 14 else slower(w, 0.5) for k, w in enumerate(made)])
-    for k in (14, 15):
-        track = dives[k].track
-        t = np.concatenate([track.t[:13], track.t[-1:]])
-        x = readonly(track.x[[*range(13), -1]])
-        dives[k] = replace(dives[k], track=replace(track, t=readonly(t), x=x, heading=track.heading[:13]))
-    _, verdicts = run(dives)
+    _, verdicts = run([*dives[:14], half_unseen(dives[14]), half_unseen(dives[15])])
     assert verdicts[14].flag is None
     assert "turned while its heading was not seen" in verdicts[14].reason
     assert verdicts[15].flag is Flag.ANOMALY
+
+
+def test_after_a_slow_dive_one_with_unseen_headings_is_slow_too():
+    made = ways(16, 8, lambda k: 0.3)
+    dives = mission([w if k < 14 else slower(w, 0.5) for k, w in enumerate(made)])
+    _, verdicts = run([*dives[:15], half_unseen(dives[15])])
+    assert flags(verdicts[14:]) == [Flag.ANOMALY] * 2
 
 
 def test_nothing_is_learnt_while_an_incident_is_open():

@@ -22,7 +22,9 @@ from gliderwatch.estimation.constants import (
     FLATTEST_GLIDE,
     GAP,
     GAP_IN_CADENCES,
+    GLIDE_ITERATIONS,
     GPS_ERROR,
+    INDUCED_BY_LIFT,
     NEW_AFTER,
     PROVISIONAL,
     RECKONED_ERROR,
@@ -37,6 +39,7 @@ from gliderwatch.estimation.constants import (
     THRUST,
     THRUST_ERROR,
     TURNING_ERROR,
+    TURNS,
     UNEVEN,
     UNSEEN,
     USUAL_PITCH,
@@ -64,7 +67,8 @@ class Observation:
     ``heading_cov`` ((2, 2)); ``current`` c (m/s, (2,), None: not reported) with standard error
     ``current_sigma`` a component; ``slip`` the part of W that an angle of attack takes, by physics, and
     ``slip_sigma`` how far it is unsure on this dive; ``thrust`` (m2/s2) is what a thruster adds to the square
-    of W, 0 without one; ``unseen`` the part of the flight within gaps between headings. ``is_free``: no
+    of W, 0 without one; ``turning`` the chance that it turned though its headings say nothing of it;
+    ``unseen`` the part of the flight within gaps between headings. ``is_free``: no
     heading was measured, so that its direction is that of g - c and what is across says nothing.
     """
 
@@ -81,6 +85,7 @@ class Observation:
     is_free: bool = False
     slip_sigma: float = 0.0
     thrust: float = 0.0
+    turning: float = 0.0
 
     @property
     def steadiness(self) -> float:
@@ -174,6 +179,7 @@ def _observed(dive: Dive, track: Track) -> tuple[Observation, float]:
             + (late / interval) ** 2 / 3 * np.outer(along, along)
         ),
         is_free=_is_free(dive),
+        turning=TURNS if _is_free(dive) and dive.features.heading_commanded > 0 else 0.0,
         current=None if current is None else readonly([current.u, current.v]),
         current_sigma=math.hypot(error, 2 * GPS_ERROR / interval),
         slip=slip_at(pitch),
@@ -290,10 +296,13 @@ def _pitch(dive: Dive) -> float:
 def slip_at(pitch: float) -> float:
     """The part of depth rate over tan(pitch) that is lost to the angle of attack alpha, at a pitch (rad).
 
-    In a steady glide alpha = C_D / (a tan(theta + alpha)) (Merckelbach et al. 2010), and
-    1 - tan(theta) / tan(theta + alpha) = alpha / (sin theta cos theta) to first order.
+    In a steady glide alpha = (C_D0 + C_D1 alpha^2) / (a tan(theta + alpha)) (Merckelbach et al. 2010), and
+    what is left of it is tan(theta) / tan(theta + alpha).
     """
-    return DRAG_BY_LIFT / math.sin(min(max(pitch, FLATTEST_GLIDE), STEEPEST_GLIDE)) ** 2
+    theta, attack = min(max(pitch, FLATTEST_GLIDE), STEEPEST_GLIDE), 0.0
+    for _ in range(GLIDE_ITERATIONS):
+        attack = (DRAG_BY_LIFT + INDUCED_BY_LIFT * attack**2) / math.tan(theta + attack)
+    return 1 - math.tan(theta) / math.tan(theta + attack)
 
 
 def with_thrust(seen: Observation, own: float) -> Observation:

@@ -220,12 +220,13 @@ def step(
     usual: float | None = None,
     hint: Mode | None = None,
     kinematic: KinematicSpeed | None = None,
+    roll_stays: bool = False,
 ) -> tuple[JointState | None, JointInfo | None]:
     """The state after one more dive, and what was found in it; a dive without a track changes nothing.
 
     ``usual`` is the healthy speed through the water (m/s) where it is known; ``hint`` is a mode that
     something else speaks for just now, that of a wing lost or bent; ``kinematic`` is W as depth rate and
-    pitch, or the mean on board, have it.
+    pitch, or the mean on board, have it; ``roll_stays``: the mean roll is known, and the usual one.
     """
     if dive.track is None or dive.start is None or dive.end is None:
         return state, None
@@ -246,7 +247,7 @@ def step(
     across = _across(state, seen, believed)
     loss, turn, bank = _tested(state, found, passage, params)
     # where no heading was measured, what looks like a step is a turn that was not seen
-    proven = None if seen.is_free else step_test.proven(loss, turn, params.alarms_per_month)
+    proven = None if seen.is_free else step_test.proven(loss, turn, params.alarms_per_month, roll_stays)
     mixed = _mixed(state, found.ways, _jumped(params.flow))
     after = _opened(_learnt(state, mixed, found, passage, across, bank, dive.end), proven)
     return after, JointInfo(
@@ -268,7 +269,7 @@ def step(
 def _explained(state: JointState, measured: Measured, params: JointParams, hint: Mode | None) -> Explanations:
     """A dive in all modes; ``hint``: also in this one."""
     jumped, shown = _jumped(params.flow)[-SHOWN:, -SHOWN:], state.cov[-SHOWN:, -SHOWN:]
-    modes = (*switched(params.modes, state.wrong), *((hint,) if hint else ()))
+    modes = (*switched(params.modes, state.wrong, measured.seen.turning), *((hint,) if hint else ()))
     return Explanations.of(explain(state.x[-SHOWN:], shown, jumped, measured, modes))
 
 

@@ -13,6 +13,7 @@ from math import tan
 from statistics import median
 
 from gliderwatch.estimation.constants import (
+    BRIEF,
     FLATTEST_PITCH,
     MAD_TO_SIGMA,
     ONBOARD_LEAST,
@@ -31,15 +32,17 @@ from gliderwatch.model import DiveFeatures
 @dataclass(frozen=True, slots=True)
 class Source:
     """One way to the speed: the ratio of W to it while none is learnt, with its standard error (None: not to
-    be used before), the least standard error, and how often it ``lies``: has nothing to do with the speed."""
+    be used before), the least standard error, how often it ``lies``: has nothing to do with the speed, and
+    the ``shortest`` dive (s) of which it tells."""
 
     first: tuple[float, float] | None
     least: float
     lies: float
+    shortest: float
 
 
-VERTICAL = Source((VERTICAL_RATIO, VERTICAL_SPREAD), VERTICAL_LEAST, VERTICAL_LIES)
-ONBOARD = Source(None, ONBOARD_LEAST, ONBOARD_LIES)
+VERTICAL = Source((VERTICAL_RATIO, VERTICAL_SPREAD), VERTICAL_LEAST, VERTICAL_LIES, BRIEF)
+ONBOARD = Source(None, ONBOARD_LEAST, ONBOARD_LIES, SHORTEST)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,12 +94,12 @@ def learn(ratios: Ratios, features: DiveFeatures, own: float) -> Ratios:
 
 def kinematic_speed(ratios: Ratios, features: DiveFeatures) -> KinematicSpeed | None:
     """W as a dive tells it; None where it does not."""
-    if features.duration < SHORTEST:
-        return None
     for source, value, earlier in (
         (VERTICAL, vertical(features), ratios.vertical),
         (ONBOARD, features.onboard_speed, ratios.onboard),
     ):
+        if features.duration < source.shortest:
+            continue
         found = _ratio(source, earlier)
         if value is not None and value > 0 and found is not None:
             ratio, sigma = found

@@ -91,13 +91,17 @@ MODES = (
 )
 
 
-def switched(modes: tuple[Mode, ...], before: Mapping[Cause, float]) -> tuple[Mode, ...]:
+def switched(
+    modes: tuple[Mode, ...], before: Mapping[Cause, float], turning: float = 0.0
+) -> tuple[Mode, ...]:
     """The modes with the chances that they have after a dive which was explained so ``before``: what is
-    wrong stays."""
+    wrong stays. ``turning``: the chance that the glider turned unseen, so that its ground velocity does not
+    fit."""
     rare = (
-        (mode.cause, max(mode.chance, STAYS * before.get(mode.cause, 0.0)))
+        (mode.cause, max(mode.chance, least, STAYS * before.get(mode.cause, 0.0)))
         for mode in modes
         if mode.cause.is_error
+        for least in (turning if mode.cause is Cause.GROUND else 0.0,)
     )
     return _with_chances(modes, tuple(rare))
 

@@ -28,6 +28,7 @@ from gliderwatch.estimation.constants import (
     RETRIMMED,
     ROLL_CONFIRMS,
     ROLL_LOST,
+    ROLL_STAYS,
     ROLL_STEP,
     SLACK,
     TURNED,
@@ -189,9 +190,9 @@ class SpeedState:
 
     ``filter``, the Kalman filter's (None: no dive yet), ``normal`` speeds learnt, ``rolls`` (rad) of the
     first healthy dives, ``rolled`` dives in a row that roll otherwise, ``slow`` Page's sum of small losses,
-    ``doubted`` slow dives in a row that were not believed, ``misfits`` of the last dives, ``ratios`` of the
-    speed to what the glider tells of it; ``trim`` of the last normal dive, ``other`` speeds (m/s) of the
-    last dives in a row that may be a new way of flying.
+    ``doubted`` (1 or 0) whether the dive before was slow, surely or in doubt, ``misfits`` of the last dives,
+    ``ratios`` of the speed to what the glider tells of it; ``trim`` of the last normal dive, ``other`` speeds
+    (m/s) of the last dives in a row that may be a new way of flying.
     """
 
     filter: JointState | None = None
@@ -233,12 +234,13 @@ def step(
     learnt = of_dives if params.learning else None
     normal = learnt or SpeedRange(params.low, (params.low + params.high) / 2, params.high, 0)
     roll = _roll_step(state, dive)
-    rolled = state.rolled + 1 if roll > ROLL_STEP else 0
+    rolled = state.rolled + 1 if roll is not None and roll > ROLL_STEP else 0
     usual = of_dives.usual if of_dives else None  # whatever the bounds are: a speed means one thing
     # the first of two dives may have been half over when it happened
-    hint = (LOST if roll > ROLL_LOST else ROLLED) if 1 <= rolled <= 2 else None
+    hint = (LOST if roll is not None and roll > ROLL_LOST else ROLLED) if 1 <= rolled <= 2 else None
+    stays = roll is not None and roll < ROLL_STAYS
     kinematic = kinematic_speed(state.ratios, dive.features)
-    estimate, info = kalman.step(state.filter, dive, params.joint, usual, hint, kinematic)
+    estimate, info = kalman.step(state.filter, dive, params.joint, usual, hint, kinematic, stays)
     if info is None:
         flag, reason = _of_reckoning_alone(state, dive, kinematic, normal, params)
         return state, Verdict(flag, reason, normal, None)
@@ -256,7 +258,9 @@ def step(
     earlier = normal
     state, flag, reason, normal = _regime(state, dive, info, kinematic, normal, flag, reason, params)
     before = earlier.usual if reason.startswith(NEW_WAY) else None
-    if flag is Flag.NORMAL and not frozen and not state.other:
+    # what may be slow, though not surely, teaches nothing: else a loss would move the range along with it
+    in_range = not normal.dives or info.estimate.speed > normal.low
+    if flag is Flag.NORMAL and in_range and not frozen and not state.other:
         state = _learnt(state, dive, info, at, params)
     # where the way hardly shows the speed, it is depth rate and pitch that a new way of flying is seen by
     is_hidden = before is not None and info.estimate.speed < normal.low
@@ -397,7 +401,7 @@ def _slow_or_fast(
         unseen = info.seen.is_free and (kinematic is not None or not state.doubted)
         if believed is None and (unseen or (not state.doubted and _may_have_turned(info, normal))):
             return replace(state, doubted=1), None, SLOW_OR_TURNED
-        return state, Flag.ANOMALY, _how_slow(info, normal, params)
+        return replace(state, doubted=1), Flag.ANOMALY, _how_slow(info, normal, params)
     state = replace(state, doubted=0) if state.doubted else state
     if info.estimate.speed - sigma > normal.high:
         if normal.dives:
@@ -449,11 +453,11 @@ def _how_slow(
     return words
 
 
-def _roll_step(state: SpeedState, dive: Dive) -> float:
-    """By how much (rad) the roll of a dive differs from the usual one; 0 where either is not known."""
+def _roll_step(state: SpeedState, dive: Dive) -> float | None:
+    """By how much (rad) the roll of a dive differs from the usual one; None where either is not known."""
     roll = dive.features.roll_mean
     if roll is None or dive.n_samples < BASELINE_LEAST or len(state.rolls) < BASELINE_LEAST:
-        return 0.0
+        return None
     return abs(roll - median(state.rolls))
 
 

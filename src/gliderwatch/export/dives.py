@@ -125,8 +125,10 @@ COLUMNS = (
     Column("p_e", "1", "difference of the two currents, 0 to 1", lambda d: d.p_e),
     Column("across_misfit", "m s-1", "misfit across the heading", _evidence("across_misfit")),
     Column("depth_max", "m", "greatest depth of the dive", _evidence("depth_max")),
-    Column("pitch_dive", "rad", "mean pitch going down", _evidence("pitch_dive"), "platform_pitch_fore_up"),
-    Column("pitch_climb", "rad", "mean pitch coming up", _evidence("pitch_climb"), "platform_pitch_fore_up"),
+    Column("pitch_dive", "rad", "median pitch going down", _evidence("pitch_dive"), "platform_pitch_fore_up"),
+    Column(
+        "pitch_climb", "rad", "median pitch coming up", _evidence("pitch_climb"), "platform_pitch_fore_up"
+    ),
     Column(
         "roll_mean",
         "rad",

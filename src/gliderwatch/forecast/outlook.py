@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from math import expm1, sin
+from math import expm1
 
 import numpy as np
 
-from gliderwatch.estimation.constants import DRAG_BY_LIFT, USUAL_PITCH
-from gliderwatch.estimation.dive_measurement import OWN, SLIP, are_apart
+from gliderwatch.estimation.constants import USUAL_PITCH
+from gliderwatch.estimation.dive_measurement import OWN, SLIP, are_apart, slip_at
 from gliderwatch.estimation.glider import Estimate
 from gliderwatch.estimation.kalman import JointParams, JointState, expected_flow
 from gliderwatch.forecast.constants import VAGUE
@@ -29,7 +29,7 @@ from gliderwatch.sea.gauss_markov import FlowParams
 
 Outlook = tuple[float, float, Flow]
 """Speed through the water and its standard error (m/s), and the forecast of the flow."""
-PHYSICAL = JointParams().slip * DRAG_BY_LIFT / sin(USUAL_PITCH) ** 2
+PHYSICAL = JointParams().slip * slip_at(USUAL_PITCH)
 """Part of the own speed that the angle of attack takes at the usual pitch, beside the slip of the state."""
 
 
