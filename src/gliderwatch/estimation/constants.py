@@ -51,8 +51,6 @@ DRAG_BY_LIFT = 0.02
 """C_D0 / a of a Slocum: parasite drag by slope of the lift (Merckelbach et al. 2019: 0.15 and 7.5 1/rad)."""
 INDUCED_BY_LIFT = 1.4
 """1/rad: C_D1 / a, induced drag by the same (10.5 1/rad2)."""
-GLIDE_ITERATIONS = 10
-"""Steps to the angle of attack, by when it stays within 0.01 %."""
 USUAL_PITCH = 0.45
 """rad: pitch of a glide where none is reported."""
 FLATTEST_GLIDE = 0.3

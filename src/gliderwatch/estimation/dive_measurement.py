@@ -22,7 +22,6 @@ from gliderwatch.estimation.constants import (
     FLATTEST_GLIDE,
     GAP,
     GAP_IN_CADENCES,
-    GLIDE_ITERATIONS,
     GPS_ERROR,
     INDUCED_BY_LIFT,
     NEW_AFTER,
@@ -299,9 +298,10 @@ def slip_at(pitch: float) -> float:
     In a steady glide alpha = (C_D0 + C_D1 alpha^2) / (a tan(theta + alpha)) (Merckelbach et al. 2010), and
     what is left of it is tan(theta) / tan(theta + alpha).
     """
-    theta, attack = min(max(pitch, FLATTEST_GLIDE), STEEPEST_GLIDE), 0.0
-    for _ in range(GLIDE_ITERATIONS):
-        attack = (DRAG_BY_LIFT + INDUCED_BY_LIFT * attack**2) / math.tan(theta + attack)
+    theta = min(max(pitch, FLATTEST_GLIDE), STEEPEST_GLIDE)
+    attack, before = 0.0, math.inf
+    while abs(attack - before) > 1e-6:
+        attack, before = (DRAG_BY_LIFT + INDUCED_BY_LIFT * attack**2) / math.tan(theta + attack), attack
     return 1 - math.tan(theta) / math.tan(theta + attack)
 
 
