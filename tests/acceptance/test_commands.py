@@ -44,6 +44,8 @@ def secretive(port: int) -> str:
         (["run", "--replay", "nowhere"], "nowhere"),
         (["run", "--replay", ".", "--cache", "nowhere"], "nowhere"),
         (["run", "--replay", "."], "no flight data files"),
+        (["run", "--replay", "packed"], "unpack packed/mission.ZIP first"),
+        (["run", "--replay", "packed/mission.ZIP"], "unpack packed/mission.ZIP first"),
         (["run", "--replay", ".", "--send"], "--send"),
         (["run", "--replay", ".", "--out", "a-file"], "a-file"),
         (["check"], "-c"),
@@ -57,6 +59,8 @@ def test_wrong_arguments_are_told_in_a_line_and_end_with_2(
     arguments: list[str], told: str, tmp_path: Path
 ) -> None:
     (tmp_path / "a-file").write_text("", encoding="utf-8")
+    (tmp_path / "packed").mkdir()
+    (tmp_path / "packed" / "mission.ZIP").write_bytes(b"PK")
     result = command(*arguments, cwd=tmp_path)
     assert result.returncode == 2
     assert told in result.stderr.strip().splitlines()[-1]

@@ -31,6 +31,7 @@ from gliderwatch.service.replay_files import (
     correct_clocks,
     find_files,
     find_logs,
+    packed,
     read_logs,
 )
 from gliderwatch.service.routing import NOBODY, Routing, routing_of
@@ -113,7 +114,11 @@ def replay(
     logs = find_logs(request.folders) if has_logs else []
     if not files and not logs:
         where = ", ".join(map(str, request.folders))
-        raise GliderwatchError(f"no flight data files (sbd, scd, mbd, mcd, dbd, dcd) or logs below {where}")
+        archive = packed(request.folders)
+        cure = "" if archive is None else f": unpack {archive} first"
+        raise GliderwatchError(
+            f"no flight data files (sbd, scd, mbd, mcd, dbd, dcd) or logs below {where}{cure}"
+        )
     on_total(len(files) + len(logs))
     with _state(request) as path, tempfile.TemporaryDirectory(prefix="gliderwatch-") as kept:
         lists = SensorLists(Path(kept))

@@ -24,6 +24,10 @@ LONGEST = 2 * 86400.0
 """Seconds after which a file is sent at the latest: if the next is opened later, there was a pause."""
 
 
+ARCHIVES = {".zip", ".tar", ".gz", ".tgz", ".bz2", ".xz", ".7z"}
+"""How names of archives end."""
+
+
 def find_files(folders: Iterable[Path]) -> list[Path]:
     """All flight data files below some folders, each once.
 
@@ -37,6 +41,14 @@ def find_files(folders: Iterable[Path]) -> list[Path]:
         if kind(path.name) is not None and (path.is_symlink() or not path.is_dir())
     }
     return list(found)
+
+
+def packed(folders: Iterable[Path]) -> Path | None:
+    """An archive at or below some folders, which may hold what was looked for; None: there is none."""
+    every = (
+        path for folder in folders for path in sorted([folder] if folder.is_file() else folder.rglob("*"))
+    )
+    return next((path for path in every if path.suffix.lower() in ARCHIVES), None)
 
 
 def correct_clocks(jobs: Sequence[Job]) -> None:
