@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from gliderwatch.simulate.scenario import DiveTruth, Fault, FaultKind, Scenario
 from gliderwatch.slocum import folders
 from gliderwatch.slocum.decode import decode
 
+Made = TypeVar("Made")
 DAY, HOUR, MONTH = 86400.0, 3600.0, 30 * 86400.0
 USUAL = SpeedParams()
 SEAS = {
@@ -133,7 +135,7 @@ def various(gliders: int, fault: FaultKind | None = None, size: float = 0.0) -> 
     return out
 
 
-def all_of(work: Callable[..., Flown], jobs: Sequence[tuple[object, ...]]) -> list[Flown]:
+def all_of(work: Callable[..., Made], jobs: Sequence[tuple[object, ...]]) -> list[Made]:
     context = multiprocessing.get_context("spawn")  # a fork would share the decoder's folder
     with ProcessPoolExecutor(mp_context=context) as pool:
         return list(pool.map(work, *zip(*jobs, strict=True), chunksize=4))

@@ -1,11 +1,12 @@
 """The joint estimator on real missions, on the score's grid, and in seas and with airframes of all kinds.
 
 python benchmarks/joint.py [--missions ../shared/data] [--gliders 8]
-python benchmarks/joint.py calibrate [--gliders 8]
+python benchmarks/joint.py calibrate [--gliders 16] [--first 1700]
 
 Dives come from files: simulated gliders write Dinkum files, which are decoded and navigated like real ones.
 What is said of a dive is said with all that is known of it in the end. `calibrate` prints how often the
-test for a step speaks on healthy gliders: the table of `estimation/step_test.py`.
+test for a step speaks on healthy gliders of 30 days in each kind of sea: the table of
+`estimation/constants.py`.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from common import machine
@@ -33,13 +35,20 @@ from flights import (
     slowed,
     various,
 )
+from sea_runs import Job, flight
 
 from gliderwatch.estimation.kalman import JointParams
 from gliderwatch.estimation.modes import Cause
-from gliderwatch.estimation.verdict import SpeedParams
+from gliderwatch.estimation.verdict import SpeedParams, SpeedState, step
 from gliderwatch.score.graft import navigate
 from gliderwatch.score.grid import cells, load_grid
+from gliderwatch.score.measures import HEALTHY
 from gliderwatch.simulate.scenario import FaultKind
+from gliderwatch.simulate.seas import SEAS as KINDS
+
+SILENT = SpeedParams(joint=JointParams(alarms_per_month=1e-12))
+"""No step is ever believed."""
+RATIOS = (8, 10, 12, 14, 16, 18, 20, 24)
 
 
 def speed_row(name: str, flights: Sequence[Flown]) -> str:
@@ -162,39 +171,60 @@ def turns(flown: Flown) -> bool:
     return bool(np.abs(apart).max(initial=0.0) >= np.pi / 3)
 
 
-def calibrate(gliders: int) -> None:
-    """How often the likeliest step of a healthy glider has a ratio above some numbers."""
-    silent = SpeedParams(joint=JointParams(alarms_per_month=1e-12))
-    found = [
-        c for c in cells(load_grid("default")) if c.scenario is not None and not c.fault.startswith("strong")
-    ]
-    jobs = [
-        (c.sea, c.scenario, silent)
-        for c in found
-        if c.size == min(d.size for d in found if d.fault == c.fault)
-    ]
-    jobs += [(name, scenario, silent) for name, scenario in various(gliders)]
-    most, months = [], 0.0
-    for flown in all_of(fly, jobs):
-        healthy = [v.info for d, v in flown.pairs() if v.info and d.t_surface < (flown.onset or np.inf)]
-        steps = [s.ratio for i in healthy for s in (i.loss, i.turn) if s is not None]
-        most.append(max(steps))
-        months += flown.healthy_months()
-    print(f"{months:.0f} glider-months, {len(most)} gliders\nratio above  gliders  a month")
-    for ratio in (8, 10, 12, 14, 16, 18, 20, 24, 28):
-        above = sum(m > ratio for m in most)
-        print(f"{ratio:11d} {above:8d} {above / months:8.3f}")
+def calibrate(gliders: int, first: int, kept: Path) -> None:
+    """How often in a month the likeliest step of a healthy glider has a ratio above some numbers, in each
+    kind of sea: of a loss or of a turn, and in all of them of each."""
+    jobs = [(Job(sea, first + k, HEALTHY, 30.0, kept),) for k in range(gliders) for sea in KINDS]
+    counted = all_of(likeliest, jobs)
+    months = sum(each.months for each in counted)
+    print(f"{months:.0f} glider-months, {len(counted)} gliders\nalarms a month at a ratio above")
+    print(f"{'':20s}" + "".join(f"{ratio:8d}" for ratio in RATIOS))
+    for sea in KINDS:
+        some = [each for each in counted if each.sea == sea]
+        print(rates(sea, [max(each.loss, each.turn) for each in some], sum(each.months for each in some)))
+    print(rates("all", [max(each.loss, each.turn) for each in counted], months))
+    print(rates("all, losses", [each.loss for each in counted], months))
+    print(rates("all, turns", [each.turn for each in counted], months))
+
+
+class Likeliest(NamedTuple):
+    """Of one healthy glider: its sea, months, and the greatest ratios of a loss and of a turn."""
+
+    sea: str
+    months: float
+    loss: float
+    turn: float
+
+
+def likeliest(job: Job) -> Likeliest:
+    """The greatest ratios of one healthy glider, where no step is ever believed."""
+    state, losses, turned = SpeedState(), [0.0], [0.0]
+    dives = navigate(flight(job).segments)
+    for dive in dives:
+        state, said = step(state, dive, SILENT)
+        if said.info is not None:
+            losses += [said.info.loss.ratio] if said.info.loss else []
+            turned += [said.info.turn.ratio] if said.info.turn else []
+    t = dives[-1].t_surface - dives[0].t_dive
+    return Likeliest(job.sea, t / (30 * DAY), max(losses), max(turned))
+
+
+def rates(name: str, most: Sequence[float], months: float) -> str:
+    counts = (sum(m > ratio for m in most) / months for ratio in RATIOS)
+    return f"{name:20s}" + "".join(f"{count:8.3f}" for count in counts)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("what", nargs="?", choices=["table", "calibrate"], default="table")
     parser.add_argument("--missions", type=Path, default=Path(__file__).parents[2] / "shared" / "data")
-    parser.add_argument("--gliders", type=int, default=8, help="in each sea and on each way")
+    parser.add_argument("--gliders", type=int, default=8, help="in each sea, and on each way")
+    parser.add_argument("--first", type=int, default=0, help="calibrate: first seed")
+    parser.add_argument("--kept", type=Path, default=Path(__file__).parents[1] / "build" / "seas")
     arguments = parser.parse_args()
     print(machine())
     if arguments.what == "calibrate":
-        calibrate(arguments.gliders)
+        calibrate(arguments.gliders, arguments.first, arguments.kept)
         return
     if arguments.missions.is_dir():
         real(arguments.missions)

@@ -71,6 +71,18 @@ class TestIncidents:
         (found,) = World({one.t_dive: one for one in made}).incidents()
         assert (found.cleared_at is not None) == cleared
 
+    @pytest.mark.parametrize(
+        "across, sigma, cleared",
+        [(-0.033, 0.01, False), (0.027, 0.01, True), (0.033, 0.018, True), (0.033, 0.0155, False)],
+    )
+    def test_measurements_disagree_until_half_of_the_misfit_is_gone(self, across, sigma, cleared):
+        was = {**DISAGREE.evidence, "across_misfit": 0.06}
+        now = {**DISAGREE.evidence, "across_misfit": across, "across_sigma": sigma}
+        made = [dive(k, "2", evidence=was) for k in range(3)]
+        made += [dive(k, "0", evidence=now) for k in range(3, 8)]
+        (found,) = World({one.t_dive: one for one in made}).incidents()
+        assert (found.cleared_at is not None) == cleared
+
     @pytest.mark.parametrize("slower, holds", [(0.04, True), (0.055, False)])
     def test_an_anomaly_has_grown_worse_by_5_cm_s(self, slower, holds):
         ack = acknowledge(incident(replace(SLOW, speed=0.19, speed_min=0.2)), "ann", "", T0)

@@ -92,17 +92,6 @@ def test_roll_alone_is_no_anomaly():
     assert Flag.ANOMALY not in flags(verdicts)
 
 
-@pytest.mark.parametrize(("part", "learns"), [(0.10, True), (0.145, False)])
-def test_a_dive_that_may_be_slow_teaches_nothing(part, learns):
-    """The range ends 15 % below the usual speed. A dive just beyond is not surely slow, nor surely well."""
-    made = ways(21, 8, lambda k: 0.7 * (k // 5))
-    dives = mission([w if k < 20 else slower(w, part) for k, w in enumerate(made)])
-    before, _ = run(dives[:-1])
-    after, verdicts = run(dives)
-    assert verdicts[-1].flag is Flag.NORMAL
-    assert len(after.normal.speeds) - len(before.normal.speeds) == learns
-
-
 def test_a_turn_that_no_heading_shows_is_no_wrong_current():
     """The commanded headings say that it went straight on, and the way is half of what it should be."""
     made = [slower(w, 0.5) if k == 15 else w for k, w in enumerate(ways(16, 9, lambda k: 0.3))]

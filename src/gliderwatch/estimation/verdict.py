@@ -258,9 +258,7 @@ def step(
     earlier = normal
     state, flag, reason, normal = _regime(state, dive, info, kinematic, normal, flag, reason, params)
     before = earlier.usual if reason.startswith(NEW_WAY) else None
-    # what may be slow, though not surely, teaches nothing: else a loss would move the range along with it
-    in_range = not normal.dives or info.estimate.speed > normal.low
-    if flag is Flag.NORMAL and in_range and not frozen and not state.other:
+    if flag is Flag.NORMAL and not frozen and not state.other:
         state = _learnt(state, dive, info, at, params)
     # where the way hardly shows the speed, it is depth rate and pitch that a new way of flying is seen by
     is_hidden = before is not None and info.estimate.speed < normal.low

@@ -89,7 +89,10 @@ THINNED = 7.0
 WELL = 0.3
 """Part of the way from the lower bound to the usual speed from which an open anomaly is over."""
 SURELY = 2.0
-"""Standard errors by which a speed must be below normal for one dive alone to be severe."""
+"""Standard errors by which a speed must be below normal for one dive alone to be severe,"""
+LINGERS = 0.5
+"""and by which, and by this part of what it was, a misfit across the heading has to be there for
+measurements still to disagree."""
 
 # Reminders of what is open
 MARKS = (1.0, 2.0, 4.0, 7.0)

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from math import inf
 
-from gliderwatch.incidents.constants import SEVERE, SURELY, WELL
+from gliderwatch.incidents.constants import LINGERS, SEVERE, SURELY, WELL
 from gliderwatch.model import Assessment, Flag, Incident, Kind
 from gliderwatch.params import AnomalyRule, FalseAlarmRule, RuleParams
 
@@ -91,9 +92,8 @@ def advance(
         # one fault is one incident: a slow glider explains what was taken for a wrong measurement
         over = () if before.incident is None else (replace(before.incident, cleared_at=dive.t_surface),)
         return RuleStates(anomaly, RuleState()), first + over
-    false_alarm, second = _watch(
-        before, dive, Kind.FALSE_ALARM, dive.flag == Flag.FALSE_ALARM, rules.false_alarm
-    )
+    disagrees = _says_of_disagreement(dive, before.incident)
+    false_alarm, second = _watch(before, dive, Kind.FALSE_ALARM, disagrees, rules.false_alarm)
     return RuleStates(anomaly, false_alarm), first + second
 
 
@@ -107,6 +107,16 @@ def _says_of_anomaly(dive: Assessment, is_open: bool) -> bool | None:
         inside = max(WELL * (usual - dive.speed_min), dive.speed_sigma or 0.0)
         return None if speed < min(dive.speed_min + inside, usual) else False
     return dive.flag == Flag.ANOMALY
+
+
+def _says_of_disagreement(dive: Assessment, opened: Incident | None) -> bool | None:
+    """Whether a dive is flagged (None: it says neither). What was ``opened`` is over when what is across the
+    heading is no longer half of what it was: a misfit at the bound is not mended by being just below."""
+    if dive.flag != Flag.NORMAL or opened is None:
+        return dive.flag == Flag.FALSE_ALARM
+    was, now = (abs(each.evidence.get("across_misfit", 0.0)) for each in (opened.last, dive))
+    sigma = dive.evidence.get("across_sigma", inf)
+    return None if now > max(LINGERS * was, SURELY * sigma) else False
 
 
 def is_severe(dive: Assessment) -> bool:
