@@ -287,10 +287,14 @@ class TestModes:
             Cause.WING: (9.0, 0.45),
         }
 
-    def test_what_was_wrong_is_wrong_again_six_times_of_ten(self):
-        after = {m.cause: m.chance for m in switched(MODES, {Cause.CURRENT: 1.0})}
-        assert after[Cause.CURRENT] == pytest.approx(0.6)
+    @pytest.mark.parametrize("cause", [Cause.CURRENT, Cause.GROUND, Cause.SPEED])
+    def test_what_was_wrong_or_changing_is_so_again_six_times_of_ten(self, cause):
+        after = {m.cause: m.chance for m in switched(MODES, {cause: 1.0})}
+        assert after[cause] == pytest.approx(0.6)
         assert sum(after.values()) == pytest.approx(1.0)
+
+    def test_another_flow_is_no_likelier_after_one(self):
+        assert switched(MODES, {Cause.FLOW: 1.0}) == switched(MODES, {})
 
     def test_an_unseen_turn_makes_the_ground_velocity_wrong(self):
         chance = {m.cause: m.chance for m in switched(MODES, {Cause.GROUND: 0.1}, turning=0.1)}

@@ -135,8 +135,8 @@ ITERATIONS = 2
 BEYOND = 0.02
 """m/s by which a speed may be found beyond what a glider can fly, before that speaks against a mode."""
 STAYS = 0.6
-"""Chance that a current, or a ground velocity, which is wrong on one dive is wrong on the next one too: a
-fault lasts."""
+"""Chance that a current, or a ground velocity, which is wrong on one dive is wrong on the next one too, and
+that a speed which changed on one dive changes on the next one too: it changed during the first."""
 LEFT_OUT = 10.0
 """m/s: error given to a measurement that is wrong: it is left out, be it as near as it may."""
 SPEED_CHANCE = 0.02

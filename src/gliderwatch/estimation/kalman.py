@@ -141,7 +141,7 @@ class JointState:
     ``t`` end of the last dive (s), ``x`` ((n,)) and ``cov`` ((n, n)) of the state; ``process_scale`` factor
     on the variance of the flow's changes and ``measurement_scale`` on that of the measurements, both learnt
     (the tests use `tested`); ``dives`` used; ``bank`` of the test for a step; ``end`` the fix that ended the
-    last dive; ``wrong`` how likely each of its measurements was wrong.
+    last dive; ``wrong`` how likely each of the causes that last explained it.
     """
 
     t: float
@@ -423,7 +423,7 @@ def _learnt(
         dives=state.dives + 1,
         bank=bank,
         end=end,
-        wrong={each: found.odds[str(each)] for each in Cause if each.is_error and str(each) in found.odds},
+        wrong={each: found.odds[str(each)] for each in Cause if each.lasts and str(each) in found.odds},
     )
 
 

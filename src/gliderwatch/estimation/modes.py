@@ -59,6 +59,12 @@ class Cause(StrEnum):
         """Whether it says that one of the measurements is wrong."""
         return self in (Cause.CURRENT, Cause.GROUND)
 
+    @property
+    def lasts(self) -> bool:
+        """Whether what explained a dive may well explain the next one: a measurement that is wrong stays so,
+        and of a speed that changed during a dive the rest is seen on the next."""
+        return self.is_error or self is Cause.SPEED
+
 
 @dataclass(frozen=True, slots=True)
 class Mode:
@@ -94,13 +100,12 @@ MODES = (
 def switched(
     modes: tuple[Mode, ...], before: Mapping[Cause, float], turning: float = 0.0
 ) -> tuple[Mode, ...]:
-    """The modes with the chances that they have after a dive which was explained so ``before``: what is
-    wrong stays. ``turning``: the chance that the glider turned unseen, so that its ground velocity does not
-    fit."""
+    """The modes with the chances that they have after a dive which was explained so ``before``. ``turning``:
+    the chance that the glider turned unseen, so that its ground velocity does not fit."""
     rare = (
         (mode.cause, max(mode.chance, least, STAYS * before.get(mode.cause, 0.0)))
         for mode in modes
-        if mode.cause.is_error
+        if mode.cause.lasts
         for least in (turning if mode.cause is Cause.GROUND else 0.0,)
     )
     return _with_chances(modes, tuple(rare))
@@ -111,7 +116,7 @@ def _with_chances(modes: tuple[Mode, ...], chances: tuple[tuple[Cause, float], .
     """The modes where these have other chances, and the rest what is left, in proportion."""
     rare = dict(chances)
     left = 1 - sum(rare.values())
-    rest = sum(mode.chance for mode in modes if not mode.cause.is_error)
+    rest = sum(mode.chance for mode in modes if mode.cause not in rare)
     return tuple(
         replace(mode, chance=rare.get(mode.cause, mode.chance / rest * left if rest else left))
         for mode in modes
