@@ -90,20 +90,20 @@ def call_logs(
     """The log of each call of a mission, in order of time."""
     rng, typing, scenario = mission.scenario.rng(7), mission.scenario.rng(9), mission.scenario
     calls, closing = make_calls(mission), _Closing(mission)
-    is_reported = False
+    aborted: float | None = None
     for t, sendings in zip(calls.times, calls.sendings, strict=True):
         chance = rng.random(4)
         is_lost = rates.abort is not None and t >= scenario.start + rates.abort * DAY
         fate = _fate(rates, ailments, t, chance)
         if is_lost:
-            fate = Fate.GLIDER_DOS if is_reported else Fate.ABORT
-            is_reported = True
+            fate = Fate.ABORT if aborted is None else Fate.GLIDER_DOS
+            aborted = t if aborted is None else aborted
         files, pilot = [s.segment for s in sendings], bool(typing.random() < rates.typing)
         lines = [
             "Connection Event: Carrier Detect found.    Iridium console active and ready...",
             *_status(mission, t, fate, closing.before(t)),
             *_devices(scenario.start, t, ailments),
-            *_aborted(rates, fate, is_lost),
+            *_aborted(rates, fate, aborted),
             *(_TYPED if pilot else ()),
             *(_transfers(files, scenario.glider, form) if fate in (Fate.USUAL, Fate.DROPPED) else ()),
         ]
@@ -225,13 +225,15 @@ def _nmea(angle: float) -> str:
     return f"{copysign(degrees * 100 + rest / 1000, angle):9.3f}"
 
 
-def _aborted(rates: CallRates, fate: Fate, is_lost: bool) -> list[str]:
+def _aborted(rates: CallRates, fate: Fate, t: float | None) -> list[str]:
+    """What a call says of the abort at a time (s; None: there was none)."""
     fell = ["Mission completed ABNORMALLY", "SEQUENCE: Running lastgasp.mi on try 0"]
-    if not is_lost:
+    if t is None:
         return [*(fell if fate is Fate.LASTGASP else ()), "ABORT HISTORY: total since reset: 0"]
     history = [
         "ABORT HISTORY: total since reset: 1",
         f"ABORT HISTORY: last abort cause: MS_ABORT_{rates.cause}",
+        f"ABORT HISTORY: last abort time: {datetime.fromtimestamp(t, UTC):%Y-%m-%dT%H:%M:%S}",
     ]
     if fate is Fate.ABORT:
         now = [
