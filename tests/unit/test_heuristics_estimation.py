@@ -115,6 +115,16 @@ class TestMeasurement:
         assert heading_sigmas(seen)[1] == pytest.approx(math.hypot(along, 0.02), rel=0.01)
         assert observe(seen).steadiness == pytest.approx(length)
 
+    def test_few_headings_and_the_reckoned_way_tell_the_length_together(self):
+        """Of eight headings east the mean is known to 0.05; by 0.03 that it is 0.8 long, as it reckoned."""
+        few = dive(0, Way(), samples=8)
+        alone, both = observe(few), observe(known_by(few, reckoned_spread=0.25 * 0.75))
+        weight = alone.heading_cov[0, 0] / (alone.heading_cov[0, 0] + 0.03**2)
+        assert 0.2 < weight < 0.8
+        assert both.heading == pytest.approx([1 - weight * 0.2, 0.0], abs=1e-3)
+        assert both.heading_cov[0, 0] == pytest.approx((1 - weight) * alone.heading_cov[0, 0], rel=1e-3)
+        assert both.heading_cov[1, 1] == pytest.approx(alone.heading_cov[1, 1])
+
     @pytest.mark.parametrize(
         ("known", "error"), [({"heading_reckoned": True}, 0.3), ({"heading_commanded": 3 * HOUR}, 0.08)]
     )

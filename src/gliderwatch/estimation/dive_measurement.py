@@ -126,26 +126,48 @@ def observe(dive: Dive) -> Observation:
         raise ValueError(f"the dive at {dive.t_dive:.0f} has no track: {dive.reason}")
     if is_unmeasured(dive):
         return _observed(dive, dive.track)[0]
-    seen, interval = _by_compass(replace(dive, current=None))
+    seen, interval, flown = _by_compass(replace(dive, current=None))
     if dive.current is None:
         return seen
     error = REPORTED if dive.current.final else PROVISIONAL
-    return replace(
+    seen = replace(
         seen,
         current=readonly([dive.current.u, dive.current.v]),
         current_sigma=math.hypot(error, 2 * GPS_ERROR / interval),
     )
+    return _shaped(seen, dive.features.reckoned_spread, flown)
+
+
+def _shaped(seen: Observation, spread: float | None, flown: float) -> Observation:
+    """The numbers of a dive with the length of its heading as its dead-reckoned way has it too.
+
+    Few headings tell the course well, and badly how much the glider turned about it. Its reckoning knows all
+    of them: of its speed through the water the mean is what the current leaves, and the rest the ``spread``
+    (m/s) of what it reckoned. ``flown`` is the part of the time between the fixes in flight.
+    """
+    rest, length = seen.rest, seen.steadiness
+    if spread is None or rest is None or length < 0.1 or flown <= 0:
+        return seen
+    straight = math.hypot(*rest.tolist()) / flown
+    reckoned, along = flown * straight / max(math.hypot(straight, spread), 1e-6), seen.heading / length
+    measured, error = float(along @ seen.heading_cov @ along), (SHAPE_ERROR * flown) ** 2
+    weight = measured / (measured + error)
+    return replace(
+        seen,
+        heading=readonly((length + weight * (reckoned - length)) * along),
+        heading_cov=readonly(seen.heading_cov - weight * measured * np.outer(along, along)),
+    )
 
 
 @lru_cache(maxsize=64)  # a dive comes again when its current is corrected
-def _by_compass(dive: Dive) -> tuple[Observation, float]:
+def _by_compass(dive: Dive) -> tuple[Observation, float, float]:
     """What of a dive does not depend on its current, where its compass tells the headings."""
     assert dive.track is not None
     return _observed(dive, dive.track)
 
 
-def _observed(dive: Dive, track: Track) -> tuple[Observation, float]:
-    """The observation of a dive, and the time (s) between its fixes."""
+def _observed(dive: Dive, track: Track) -> tuple[Observation, float, float]:
+    """The observation of a dive, the time (s) between its fixes, and the part of that in flight."""
     dt = np.diff(track.t)
     interval = float(dt.sum())
     flying = flying_in(track)
@@ -185,7 +207,7 @@ def _observed(dive: Dive, track: Track) -> tuple[Observation, float]:
         thrust=THRUST * (dive.features.thruster or 0.0) * math.cos(pitch) ** 2,
         unseen=_unseen(dt[flying]),
     )
-    return seen, interval
+    return seen, interval, flown
 
 
 def _not_logged(dive: Dive, dt: Array) -> float:

@@ -76,6 +76,19 @@ def has_reckoning(samples: Samples, flight: Flight) -> bool:
     return _reckoning(samples, flight) is not None
 
 
+def reckoned_spread(samples: Samples, flight: Flight) -> float | None:
+    """Standard deviation (m/s) of the glider's dead-reckoned velocity about its mean on a flight: what it
+    turned. A current that was put into the way is in the mean alone. None: the way has no shape."""
+    found = _reckoning(samples, flight)
+    if found is None:
+        return None
+    lat, lon = found
+    dt = np.diff(lat.t)
+    velocities = np.diff(to_plane(lat.v, lon.v, float(lat.v[0]), float(lon.v[0])), axis=0) / dt[:, None]
+    off = velocities - dt @ velocities / dt.sum()
+    return float(np.sqrt(dt @ (off**2).sum(axis=1) / dt.sum()))
+
+
 def _reckoning(samples: Samples, flight: Flight) -> tuple[Series, Series] | None:
     """The glider's own positions on a flight; None if too sparse, or if they jump to a fix."""
     lat = get(samples, "dr_lat").between(flight.start, flight.end)
