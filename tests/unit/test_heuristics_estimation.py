@@ -125,6 +125,11 @@ class TestMeasurement:
         assert both.heading_cov[0, 0] == pytest.approx((1 - weight) * alone.heading_cov[0, 0], rel=1e-3)
         assert both.heading_cov[1, 1] == pytest.approx(alone.heading_cov[1, 1])
 
+    @pytest.mark.parametrize("apart", [0.3, 1.0, 2.5])
+    def test_what_the_reckoned_way_tells_leaves_a_covariance(self, apart):
+        turned = dive(0, Way(heading=(0.0, 0.0, 0.0, apart)), samples=8)
+        assert min(np.linalg.eigvalsh(observe(known_by(turned, reckoned_spread=0.1)).heading_cov)) > 0
+
     @pytest.mark.parametrize(
         ("known", "error"), [({"heading_reckoned": True}, 0.3), ({"heading_commanded": 3 * HOUR}, 0.08)]
     )

@@ -150,12 +150,12 @@ def _shaped(seen: Observation, spread: float | None, flown: float) -> Observatio
         return seen
     straight = math.hypot(*rest.tolist()) / flown
     reckoned, along = flown * straight / max(math.hypot(straight, spread), 1e-6), seen.heading / length
-    measured, error = float(along @ seen.heading_cov @ along), (SHAPE_ERROR * flown) ** 2
-    weight = measured / (measured + error)
+    turned = seen.heading_cov @ along
+    gain = turned / (float(along @ turned) + (SHAPE_ERROR * flown) ** 2)
     return replace(
         seen,
-        heading=readonly((length + weight * (reckoned - length)) * along),
-        heading_cov=readonly(seen.heading_cov - weight * measured * np.outer(along, along)),
+        heading=readonly(seen.heading + gain * (reckoned - length)),
+        heading_cov=readonly(seen.heading_cov - np.outer(gain, turned)),
     )
 
 
