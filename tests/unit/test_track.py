@@ -115,6 +115,12 @@ def test_the_spread_of_the_reckoned_velocity_is_what_it_turned(known):
     assert reckoned_spread(steady(90.0), FLIGHT) is None
 
 
+@pytest.mark.parametrize(("apart", "tells"), [(890.0, True), (910.0, False)])
+def test_positions_a_quarter_of_an_hour_apart_hide_turns(apart, tells):
+    own = reckoned(np.arange(300.0, 7501.0, apart), (0.2, 0.2))
+    assert (reckoned_spread(own, FLIGHT) is not None) == tells
+
+
 def test_headings_are_interpolated_as_vectors():
     """From 350 to 10 degrees by way of north."""
     track = build_track(heading((300.0, 350.0), (7500.0, 10.0)), FLIGHT, START, end_at(0.0, 2000.0))
