@@ -123,6 +123,22 @@ class TestCorrections:
         self.change(world, 2, speed=0.12, reference_u=0.16)
         assert talk.update(world) == []
 
+    def test_not_when_the_dive_of_a_reminder_has_no_flag_in_the_end(self):
+        """Its final current was right: the incident stands as before, as the reminder says."""
+        talk, letters = Talk(reminder_hours=24.0), "011"
+        assert talk.update(letters) == ["anomaly"]
+        while not (said := talk.update(letters)):
+            letters += "1"
+        assert said == ["reminder"]
+        assert talk.update(letters[:-1] + "0") == []
+        assert talk.update(letters[:-1] + "01") == []
+
+    def test_when_the_dive_that_opened_it_has_no_flag_and_it_stands(self):
+        talk = Talk()
+        assert talk.update("0111") == ["anomaly"]
+        assert talk.update("0110") == ["correction"]
+        assert "stands" in talk.alerts[-1].title
+
     def test_when_a_missing_segment_takes_the_flag_away(self):
         talk, world = self.opened()
         self.change(world, 1, flag=0, speed=0.25)

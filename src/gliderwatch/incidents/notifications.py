@@ -339,7 +339,9 @@ def _continued(thread: Thread, now: Incident | None, moment: _Moment) -> tuple[T
     if now.cleared_at is not None and thread.is_open:
         return _message(thread, _cleared(now, moment), moment)
     moved = now.since != thread.reported.since or now.cleared_at != thread.reported.cleared_at
-    if moved or thread.withdrawn or _changed(thread.dive, dive):
+    # a reminder says that the incident stands: it does, whatever the flag of its last dive is in the end
+    is_other = thread.messages == 1 and thread.dive.flag != dive.flag
+    if moved or thread.withdrawn or is_other or _changed(thread.dive, dive):
         content = Corrected(thread.reported, now, dive, _why(thread, dive), situation(facts, now.id))
         return _message(thread, content, moment)
     is_quiet = now.cleared_at is not None or holds_acknowledgement(thread, now, moment.acks)
@@ -350,8 +352,8 @@ def _continued(thread: Thread, now: Incident | None, moment: _Moment) -> tuple[T
 
 
 def _changed(reported: Assessment, now: Assessment) -> bool:
-    """Whether what was reported of a dive is no longer true enough."""
-    if reported.flag != now.flag or (reported.speed is None) != (now.speed is None):
+    """Whether what was reported of the speed and the flow on a dive is no longer true enough."""
+    if (reported.speed is None) != (now.speed is None):
         return True
     if (
         reported.speed is not None
