@@ -130,8 +130,11 @@ class TestCorrections:
         while not (said := talk.update(letters)):
             letters += "1"
         assert said == ["reminder"]
-        assert talk.update(letters[:-1] + "0") == []
-        assert talk.update(letters[:-1] + "01") == []
+        world = World.of(letters)
+        self.change(world, len(letters) - 1, flag=0)
+        assert talk.update(world) == []
+        self.change(world, len(letters) - 1, speed=0.25)
+        assert talk.update(world) == ["correction"]
 
     def test_when_the_dive_that_opened_it_has_no_flag_and_it_stands(self):
         talk = Talk()

@@ -130,9 +130,9 @@ def test_ratio_bound_follows_the_calibration():
     rates = [0.5, 0.2, 0.1, 0.05, 0.01]
     bounds = [ratio_bound(rate) for rate in rates]
     assert bounds == sorted(bounds)
-    # 74 glider-months: 15 gliders above 14, 5 above 18
-    assert ratio_bound(15 / 74) == pytest.approx(14, abs=1)
-    assert ratio_bound(5 / 74) == pytest.approx(18, abs=1)
+    # 48 glider-months in the worst seas: 7 gliders above 14, 3 above 18
+    assert ratio_bound(7 / 48) == pytest.approx(14, abs=1)
+    assert ratio_bound(3 / 48) == pytest.approx(18, abs=1)
     assert ratio_bound(3.0) == ratio_bound(0.5)  # more was not measured
 
 
