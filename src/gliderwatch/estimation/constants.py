@@ -181,9 +181,9 @@ STEP_SIZE = 0.5
 LONGEST_INNOVATION = 4.0
 """Standard errors: an innovation that is longer counts as this long, as no dive alone may prove a step."""
 CALIBRATED_ALARMS = 0.5
-"""Alarms that a healthy glider gives in a month at a ratio of `CALIBRATED_RATIO`. With the next two that is so
-in the worst kinds of sea, as `python benchmarks/joint.py calibrate` printed (176 gliders of 30 days, eleven
-kinds of sea, 48 of them in the three worst: critical-30, front, shallow):
+"""Alarms that a healthy glider gives in a month at a ratio of `CALIBRATED_RATIO`. With the next two that is
+so in the worst kinds of sea, as `python benchmarks/joint.py calibrate` printed (176 gliders of 30 days,
+eleven kinds of sea, 48 of them in the three worst: critical-30, front, shallow):
 
     ratio above                   8     10    12    14    16    18    20    24
     alarms a month, the worst     .81   .50   .21   .15   .08   .06   .02   .02
