@@ -7,13 +7,11 @@ from gliderwatch.estimation import step_test
 from gliderwatch.estimation.constants import OLDER_EVERY, WINDOW
 from gliderwatch.estimation.step_test import (
     Bank,
-    Step,
     Update,
     advance,
     cusum,
     cusum_bound,
     likeliest,
-    proven,
     ratio_bound,
 )
 
@@ -134,21 +132,6 @@ def test_ratio_bound_follows_the_calibration():
     assert ratio_bound(7 / 48) == pytest.approx(14, abs=1)
     assert ratio_bound(3 / 48) == pytest.approx(18, abs=1)
     assert ratio_bound(3.0) == ratio_bound(0.5)  # more was not measured
-
-
-@pytest.mark.parametrize(
-    ("ratio", "stays", "told"),
-    [(19.1, False, False), (19.3, False, True), (26.9, True, False), (27.2, True, True)],
-)
-def test_a_loss_has_to_be_fifty_times_as_likely_where_the_roll_stays(ratio, stays, told):
-    """2 ln 50 = 7.8: no wing was ever lost or bent (000) that left the roll what it was."""
-    loss = Step(ratio, 0, 0.1, np.zeros((1, 1)), np.ones((1, 1)), np.ones(1))
-    assert (proven(loss, None, 0.05, stays) is loss) == told
-
-
-def test_a_turn_of_the_compass_has_no_roll():
-    turn = Step(20.0, 1, 0.1, np.zeros((1, 1)), np.ones((1, 1)), np.ones(1))
-    assert proven(None, turn, 0.05, roll_stays=True) is turn
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, math.nan])

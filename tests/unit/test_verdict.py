@@ -84,6 +84,17 @@ def test_lost_wing_is_told_where_it_rolls_the_glider():
     assert Flag.ANOMALY not in flags(verdicts[:36])
 
 
+@pytest.mark.parametrize("sent", [True, False])
+def test_a_loss_that_turns_with_the_heading_is_no_wing_where_the_roll_stays(sent):
+    """What the glider does not know of shows when it turns; a roll that is sent would have shown it."""
+    made = ways(60, 7, lambda k: 1.6 * (k // 3))
+    dives = mission([w if k < 24 else slower(w, 0.5, hidden=True) for k, w in enumerate(made)])
+    if not sent:
+        dives = [replace(d, features=replace(d.features, roll_mean=None)) for d in dives]
+    _, verdicts = run(dives)
+    assert (Flag.ANOMALY in flags(verdicts)) != sent
+
+
 def test_roll_alone_is_no_anomaly():
     made = ways(
         64, 6, lambda k: 0.9 * (k // 3)

@@ -299,10 +299,8 @@ ROLL_LOST = 0.19
 """rad, 11 degrees: a step of the mean roll that is taken for a lost or bent wing. USF-Gansett kept 11 to 15
 degrees after a shark had bent one (000, III.B.3). On a healthy real mission a new trim made one of 0.18."""
 ROLL_STAYS = 0.05
-"""rad: a mean roll nearer than this to the usual one is as before."""
-UNROLLED = 0.02
-"""Chance that a glider which has lost or bent a wing rolls as before. Of those in 000, a bent wing and two
-with a remora beside a wing, all rolled."""
+"""rad: a mean roll nearer than this to the usual one is as before. No wing was lost then: of those in 000, a
+bent wing and two with a remora beside a wing, all rolled."""
 ROLL_CONFIRMS = 0.67
 """Standard errors by which a speed must be below normal where the glider rolls otherwise for two dives:
 three to one."""

@@ -246,8 +246,10 @@ def step(
     found = _explained(state, Measured(seen, kinematic, state.tested, slipping), params, hint)
     across = _across(state, seen, believed)
     loss, turn, bank = _tested(state, found, passage, params)
+    # a loss that the glider does not know of is that of a wing: where the roll stays it is the sea's; and
     # where no heading was measured, what looks like a step is a turn that was not seen
-    proven = None if seen.is_free else step_test.proven(loss, turn, params.alarms_per_month, roll_stays)
+    likely = None if roll_stays else loss
+    proven = None if seen.is_free else step_test.proven(likely, turn, params.alarms_per_month)
     mixed = _mixed(state, found.ways, _jumped(params.flow))
     after = _opened(_learnt(state, mixed, found, passage, across, bank, dive.end), proven)
     return after, JointInfo(

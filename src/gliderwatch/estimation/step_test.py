@@ -16,7 +16,6 @@ from gliderwatch.estimation.constants import (
     OLDER_EVERY,
     OLDER_KEPT,
     STEP_SIZE,
-    UNROLLED,
     WINDOW,
 )
 from gliderwatch.estimation.dive_measurement import SIDE, SLIP
@@ -224,15 +223,7 @@ def steps(
     return likeliest(bank, 0, sign=1), likeliest(bank, 1), bank
 
 
-def proven(
-    loss: Step | None, turn: Step | None, alarms_per_month: float, roll_stays: bool = False
-) -> Step | None:
-    """The step that is too likely for chance, if there is one.
-
-    A loss that the glider does not know of is that of a wing, and where its ``roll_stays`` what it was, that
-    speaks against it.
-    """
+def proven(loss: Step | None, turn: Step | None, alarms_per_month: float) -> Step | None:
+    """The step that is too likely for chance, if there is one."""
     bound = ratio_bound(alarms_per_month)
-    bounds = (bound - 2 * math.log(UNROLLED) if roll_stays else bound, bound)
-    steps = zip((loss, turn), bounds, strict=True)
-    return next((step for step, least in steps if step is not None and step.ratio > least), None)
+    return next((step for step in (loss, turn) if step is not None and step.ratio > bound), None)
