@@ -203,7 +203,7 @@ def slowed(dive: Dive, part: float) -> Dive:
     speed = own[0] if own and 0 < own[0] < 1.3 else dive.features.onboard_speed or 0.3
     steps = dive.track.heading * np.diff(dive.track.t)[:, None]
     way = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
-    names = ("depth_rate_dive", "depth_rate_climb", "onboard_speed", "reckoned_spread")
+    names = ("depth_rate_dive", "depth_rate_climb", "onboard_speed")
     told = {name: getattr(dive.features, name) for name in names}
     slower = {name: (1 - part) * value for name, value in told.items() if value is not None}
     return replace(

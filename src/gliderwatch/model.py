@@ -270,10 +270,9 @@ class DiveFeatures:
     in flight (0: circled, 1: straight), ``heading_mean`` its direction (rad, clockwise from north),
     ``heading_commanded`` the part of headings that were commanded, not measured; ``heading_reckoned``: none
     were measured, the dead-reckoned way has the shape of the dive; ``heading_assumed``: nothing tells the
-    course. ``reckoned_spread`` (m/s) is by how much the dead-reckoned velocity differs from its mean. In a
-    dive with ``surfacing_unseen`` the glider surfaced without a fix. ``depth_max`` in m; ``pitch_dive`` and
-    ``pitch_climb`` (medians), mean ``roll_mean`` and spread ``roll_std`` in rad, nose up and to starboard
-    positive; ``thruster`` the part of the time that it was on; ``depth_rate_dive`` and
+    course. In a dive with ``surfacing_unseen`` the glider surfaced without a fix. ``depth_max`` in m;
+    ``pitch_dive`` and ``pitch_climb`` (medians), mean ``roll_mean`` and spread ``roll_std`` in rad, nose up
+    and to starboard positive; ``thruster`` the part of the time that it was on; ``depth_rate_dive`` and
     ``depth_rate_climb`` in m/s, down positive; ``yos`` turns from dive to climb; ``ballast_dive`` and
     ``ballast_climb`` the volume pumped (m3); ``vacuum`` in Pa.
     """
@@ -286,7 +285,6 @@ class DiveFeatures:
     heading_mean: float | None = None
     heading_commanded: float = 0.0
     heading_reckoned: bool = False
-    reckoned_spread: float | None = None
     heading_assumed: bool = False
     surfacing_unseen: bool = False
     depth_max: float | None = None

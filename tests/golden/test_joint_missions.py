@@ -71,7 +71,7 @@ def slowed(dive, part):
     steps = dive.track.heading * np.diff(dive.track.t)[:, None]
     way = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
     track = replace(dive.track, x=readonly(dive.track.x - part * speed * way))
-    told = {name: getattr(dive.features, name) for name in (*PROPORTIONAL, "reckoned_spread")}
+    told = {name: getattr(dive.features, name) for name in PROPORTIONAL}
     slower = {name: (1 - part) * value for name, value in told.items() if value is not None}
     return replace(dive, track=track, features=replace(dive.features, **slower))
 

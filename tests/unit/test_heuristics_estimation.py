@@ -105,31 +105,15 @@ class TestMeasurement:
     @pytest.mark.parametrize(
         ("known", "along", "length"),
         [
-            ({"heading_reckoned": True}, 0.03, 0.995),
-            ({"heading_commanded": 3 * HOUR}, 0.03, 0.995),
+            ({"heading_reckoned": True}, 0.03, 1.0),
+            ({"heading_commanded": 3 * HOUR}, 0.03, 1.0),
             ({"heading_assumed": True}, 0.2, 0.92),
         ],
     )
     def test_a_length_that_no_compass_measured(self, known, along, length):
-        """Where a swing of 0.1 rad is not seen, exp(-0.1^2 / 2) of it is left."""
         seen = known_by(EAST, **known)
         assert heading_sigmas(seen)[1] == pytest.approx(math.hypot(along, 0.02), rel=0.01)
-        assert observe(seen).steadiness == pytest.approx(length, abs=1e-4)
-
-    def test_few_headings_and_the_reckoned_way_tell_the_length_together(self):
-        """Of eight headings east the mean is known to 0.05; by 0.03 that it is 0.8 long, as it reckoned."""
-        few = dive(0, Way(), samples=8)
-        alone, both = observe(few), observe(known_by(few, reckoned_spread=0.25 * 0.75))
-        weight = alone.heading_cov[0, 0] / (alone.heading_cov[0, 0] + 0.03**2)
-        assert 0.2 < weight < 0.8
-        assert both.heading == pytest.approx([1 - weight * (1 - 0.995 * 0.8), 0.0], abs=1e-3)
-        assert both.heading_cov[0, 0] == pytest.approx((1 - weight) * alone.heading_cov[0, 0], rel=1e-3)
-        assert both.heading_cov[1, 1] == pytest.approx(alone.heading_cov[1, 1])
-
-    @pytest.mark.parametrize("apart", [0.3, 1.0, 2.5])
-    def test_what_the_reckoned_way_tells_leaves_a_covariance(self, apart):
-        turned = dive(0, Way(heading=(0.0, 0.0, 0.0, apart)), samples=8)
-        assert min(np.linalg.eigvalsh(observe(known_by(turned, reckoned_spread=0.1)).heading_cov)) > 0
+        assert observe(seen).steadiness == pytest.approx(length)
 
     @pytest.mark.parametrize(
         ("known", "error"), [({"heading_reckoned": True}, 0.3), ({"heading_commanded": 3 * HOUR}, 0.08)]
@@ -150,12 +134,11 @@ class TestMeasurement:
         [
             ({}, 0.0),
             ({"heading_commanded": 1.0}, 0.1),
-            ({"heading_reckoned": True}, 0.1),
-            ({"heading_reckoned": True, "reckoned_spread": 0.02}, 0.0),
+            ({"heading_reckoned": True}, 0.0),
             ({"heading_assumed": True}, 0.0),
         ],
     )
-    def test_a_glider_may_turn_where_commanded_headings_or_far_positions_alone_are_sent(self, known, chance):
+    def test_a_glider_may_turn_where_commanded_headings_alone_are_sent(self, known, chance):
         assert observe(known_by(EAST, **known)).turning == chance
         assert observe(replace(known_by(EAST, **known), current=None)).turning == 0.0
 

@@ -7,7 +7,7 @@ from gliderwatch.model import Current, Fix, Track
 from gliderwatch.navigation.features import evidence, flight_features, track_features
 from gliderwatch.navigation.flight import Flight
 from gliderwatch.navigation.geodesy import from_plane, to_plane
-from gliderwatch.navigation.track import build_track, closure, mean_heading, reckoned_spread
+from gliderwatch.navigation.track import build_track, closure, mean_heading
 from missions import LAT, LON, series
 
 H = 3600.0
@@ -97,28 +97,6 @@ def test_reckoning_that_jumps_to_a_fix_is_not_used():
     with_jump = build_track(steady(90.0) | jumped, FLIGHT, START, end_at(2000.0, 0.0))
     without = build_track(steady(90.0), FLIGHT, START, end_at(2000.0, 0.0))
     assert with_jump.x.tolist() == without.x.tolist()
-
-
-@pytest.mark.parametrize("known", [(0.0, 0.0), (0.3, -0.1)])
-def test_the_spread_of_the_reckoned_velocity_is_what_it_turned(known):
-    """0.2 m/s to the north-east for a third of the time, and to the south-east; any current that it knew."""
-    times = np.arange(300.0, 7501.0, 400.0)
-    north = np.where(times[1:] <= 2700.0, 0.2, -0.2)
-    steps = np.column_stack([np.full(len(north), 0.2), north]) + known
-    way = np.concatenate([np.zeros((1, 2)), np.cumsum(400.0 * steps, axis=0)])
-    places = [from_plane(at, LAT, LON) for at in way]
-    own = {
-        f"dr_{n}": series([(t, p[k]) for t, p in zip(times, places, strict=True)])
-        for k, n in enumerate(("lat", "lon"))
-    }
-    assert reckoned_spread(own, FLIGHT) == pytest.approx(0.2 * np.sqrt(1 - (1 / 3) ** 2), rel=0.01)
-    assert reckoned_spread(steady(90.0), FLIGHT) is None
-
-
-@pytest.mark.parametrize(("apart", "tells"), [(890.0, True), (910.0, False)])
-def test_positions_a_quarter_of_an_hour_apart_hide_turns(apart, tells):
-    own = reckoned(np.arange(300.0, 7501.0, apart), (0.2, 0.2))
-    assert (reckoned_spread(own, FLIGHT) is not None) == tells
 
 
 def test_headings_are_interpolated_as_vectors():

@@ -57,11 +57,6 @@ from gliderwatch.navigation.track import flown as flying_in
 # rate and pitch, and reports what is left as depth-averaged current: c = g - W h.
 
 
-SWUNG = math.exp(-(SWING**2) / 2)
-"""Part of a way that is left where a glider swings about its course, as neither the headings that it was
-commanded nor positions minutes apart show."""
-
-
 @dataclass(frozen=True, slots=True)
 class Observation:
     """The numbers of one dive.
@@ -130,58 +125,27 @@ def observe(dive: Dive) -> Observation:
     if dive.track is None:
         raise ValueError(f"the dive at {dive.t_dive:.0f} has no track: {dive.reason}")
     if is_unmeasured(dive):
-        seen, _, _, late = _observed(dive, dive.track)
-        return _ends_unlogged(seen, late)
-    seen, interval, flown, late = _by_compass(replace(dive, current=None))
+        return _observed(dive, dive.track)[0]
+    seen, interval = _by_compass(replace(dive, current=None))
     if dive.current is None:
-        return _ends_unlogged(seen, late)
+        return seen
     error = REPORTED if dive.current.final else PROVISIONAL
-    seen = replace(
+    return replace(
         seen,
         current=readonly([dive.current.u, dive.current.v]),
         current_sigma=math.hypot(error, 2 * GPS_ERROR / interval),
     )
-    return _ends_unlogged(_shaped(seen, dive.features.reckoned_spread, flown), late)
-
-
-def _ends_unlogged(seen: Observation, late: float) -> Observation:
-    """The numbers of a dive whose ends, a part ``late`` of its time, nothing was logged of."""
-    along = seen.heading / max(seen.steadiness, 1e-6)
-    return replace(seen, heading_cov=readonly(seen.heading_cov + late**2 / 3 * np.outer(along, along)))
-
-
-def _shaped(seen: Observation, spread: float | None, flown: float) -> Observation:
-    """The numbers of a dive with the length of its heading as its dead-reckoned way has it too.
-
-    Few headings tell the course well, and badly how much the glider turned about it. Its reckoning knows all
-    of them: of its speed through the water the mean is what the current leaves, and the rest the ``spread``
-    (m/s) of what it reckoned. ``flown`` is the part of the time between the fixes in flight.
-    """
-    rest, length = seen.rest, seen.steadiness
-    if spread is None or rest is None or length < 0.1 or flown <= 0:
-        return seen
-    straight = math.hypot(*rest.tolist()) / flown
-    reckoned = flown * SWUNG * straight / max(math.hypot(straight, spread), 1e-6)
-    along = seen.heading / length
-    turned = seen.heading_cov @ along
-    gain = turned / (float(along @ turned) + (SHAPE_ERROR * flown) ** 2)
-    return replace(
-        seen,
-        heading=readonly(seen.heading + gain * (reckoned - length)),
-        heading_cov=readonly(seen.heading_cov - np.outer(gain, turned)),
-    )
 
 
 @lru_cache(maxsize=64)  # a dive comes again when its current is corrected
-def _by_compass(dive: Dive) -> tuple[Observation, float, float, float]:
+def _by_compass(dive: Dive) -> tuple[Observation, float]:
     """What of a dive does not depend on its current, where its compass tells the headings."""
     assert dive.track is not None
     return _observed(dive, dive.track)
 
 
-def _observed(dive: Dive, track: Track) -> tuple[Observation, float, float, float]:
-    """The observation of a dive as if all of it were logged, the time (s) between its fixes, the part of that
-    in flight, and the part that is not logged."""
+def _observed(dive: Dive, track: Track) -> tuple[Observation, float]:
+    """The observation of a dive, and the time (s) between its fixes."""
     dt = np.diff(track.t)
     interval = float(dt.sum())
     flying = flying_in(track)
@@ -193,6 +157,8 @@ def _observed(dive: Dive, track: Track) -> tuple[Observation, float, float, floa
     velocities = (np.diff(track.x, axis=0) / np.maximum(dt, 1e-3)[:, None])[flying]
     vectors, spread = _directed(vectors, velocities, share, dive)
     error = REPORTED if current is None or current.final else PROVISIONAL
+    heading = share @ vectors
+    along = heading / max(float(np.hypot(*heading)), 1e-6)
     pitch = _pitch(dive)
     seen = Observation(
         start=float(track.t[0]),
@@ -201,7 +167,7 @@ def _observed(dive: Dive, track: Track) -> tuple[Observation, float, float, floa
         ground_cov=readonly(
             (2 * (GPS_ERROR / interval) ** 2 + ((1 - flown) * SURFACE_FLOW) ** 2) * np.eye(2)
         ),
-        heading=readonly(share @ vectors),
+        heading=readonly(heading),
         heading_cov=readonly(
             (
                 _missing(dive, interval, flown)
@@ -209,16 +175,17 @@ def _observed(dive: Dive, track: Track) -> tuple[Observation, float, float, floa
                 else _heading_cov(vectors, share, dive, interval)
             )
             + spread
+            + (late / interval) ** 2 / 3 * np.outer(along, along)
         ),
         is_free=_is_free(dive),
-        turning=TURNS if _is_free(dive) and _may_have_turned(dive) else 0.0,
+        turning=TURNS if _is_free(dive) and dive.features.heading_commanded > 0 else 0.0,
         current=None if current is None else readonly([current.u, current.v]),
         current_sigma=math.hypot(error, 2 * GPS_ERROR / interval),
         slip=slip_at(pitch),
         thrust=THRUST * (dive.features.thruster or 0.0) * math.cos(pitch) ** 2,
         unseen=_unseen(dt[flying]),
     )
-    return seen, interval, flown, late / interval
+    return seen, interval
 
 
 def _not_logged(dive: Dive, dt: Array) -> float:
@@ -248,12 +215,6 @@ def are_apart(end: Fix, start: Fix) -> bool:
 def _is_free(dive: Dive) -> bool:
     """Whether the direction of a dive's heading is that which its current leaves."""
     return dive.current is not None and is_unmeasured(dive)
-
-
-def _may_have_turned(dive: Dive) -> bool:
-    """Whether the headings that were commanded, or positions far apart, are all that shows a turn."""
-    features = dive.features
-    return features.heading_commanded > 0 or (features.heading_reckoned and features.reckoned_spread is None)
 
 
 def is_unmeasured(dive: Dive) -> bool:
@@ -288,9 +249,9 @@ def _directed(vectors: Array, velocities: Array, share: Array, dive: Dive) -> tu
     seen = float(np.hypot(*(share @ vectors))) / flown
     if reckoned:
         speeds = np.hypot(*through.T)
-        length, error = SWUNG * rest / max(float(share @ speeds) / flown, rest), SHAPE_ERROR
+        length, error = rest / max(float(share @ speeds) / flown, rest), SHAPE_ERROR
     elif commanded:
-        length, error = SWUNG * seen, STEERED_ERROR if seen > STRAIGHT else TURNING_ERROR
+        length, error = seen, STEERED_ERROR if seen > STRAIGHT else TURNING_ERROR
     else:
         length, error = ASSUMED_LENGTH * seen, ASSUMED_ERROR if seen > STRAIGHT else TURNING_ERROR
     error *= flown

@@ -91,9 +91,6 @@ RECKONED_PART = 0.8
 """Part of a flight that they cover at least."""
 RECKONED_GAP = 0.2
 """Part of a flight that lies between two of them at most (or `SPARSE`)."""
-RECKONED_TURN = 900.0
-"""s between two of them at most where they tell how much the glider turned: at 1800 s a dive with a turn in
-it was told 9 % too slow (`benchmarks/seas.py`, deep-inertial)."""
 
 # How a dive was flown
 FEW_SAMPLES = 3

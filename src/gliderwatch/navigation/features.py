@@ -21,7 +21,7 @@ from gliderwatch.navigation.constants import (
     STEEP_PITCH,
 )
 from gliderwatch.navigation.flight import Flight, Samples, get
-from gliderwatch.navigation.track import Closure, has_reckoning, mean_heading, reckoned_spread
+from gliderwatch.navigation.track import Closure, has_reckoning, mean_heading
 
 
 def evidence(features: DiveFeatures, closed: Closure | None = None) -> dict[str, float]:
@@ -40,7 +40,6 @@ def evidence(features: DiveFeatures, closed: Closure | None = None) -> dict[str,
         "heading_mean": None if mean is None else degrees(mean) % 360,
         "heading_commanded": f.heading_commanded or None,
         "heading_reckoned": float(f.heading_reckoned) or None,
-        "reckoned_spread": f.reckoned_spread,
         "heading_assumed": float(f.heading_assumed) or None,
         "surfacing_unseen": float(f.surfacing_unseen) or None,
         "depth_max": f.depth_max,
@@ -83,7 +82,6 @@ def track_features(samples: Samples, flight: Flight, track: Track) -> DiveFeatur
         heading_mean=atan2(mean[0], mean[1]),
         heading_commanded=len(commanded) / len(headings) if len(commanded) and not shaped else 0.0,
         heading_reckoned=shaped,
-        reckoned_spread=reckoned_spread(samples, flight),
         heading_assumed=unmeasured and not shaped and not len(commanded),
     )
 

@@ -17,7 +17,6 @@ from gliderwatch.navigation.constants import (
     RECKONED_GAP,
     RECKONED_PART,
     RECKONED_POSITIONS,
-    RECKONED_TURN,
     SPARSE,
 )
 from gliderwatch.navigation.flight import Flight, Samples, get
@@ -75,22 +74,6 @@ def _speed(samples: Samples, flight: Flight) -> float:
 def has_reckoning(samples: Samples, flight: Flight) -> bool:
     """Whether the glider's own dead reckoning gives the shape of a flight."""
     return _reckoning(samples, flight) is not None
-
-
-def reckoned_spread(samples: Samples, flight: Flight) -> float | None:
-    """Standard deviation (m/s) of the glider's dead-reckoned velocity about its mean on a flight: what it
-    turned. A current that was put into the way is in the mean alone. None: the way has no shape, or one too
-    coarse for that, as a turn between two positions is lost."""
-    found = _reckoning(samples, flight)
-    if found is None:
-        return None
-    lat, lon = found
-    dt = np.diff(lat.t)
-    if dt.max() > RECKONED_TURN:
-        return None
-    velocities = np.diff(to_plane(lat.v, lon.v, float(lat.v[0]), float(lon.v[0])), axis=0) / dt[:, None]
-    off = velocities - dt @ velocities / dt.sum()
-    return float(np.sqrt(dt @ (off**2).sum(axis=1) / dt.sum()))
 
 
 def _reckoning(samples: Samples, flight: Flight) -> tuple[Series, Series] | None:

@@ -139,11 +139,6 @@ def foreseen_by_one_sea(state: Any) -> Any:
     return state
 
 
-def with_spread(state: Any) -> Any:
-    """Layout 7 to 8: a dive has the spread of its dead-reckoned velocity; of those before it is not known."""
-    return state
-
-
 def _array(written: Mapping[str, Any]) -> Array:
     """An array as a record holds it."""
     return np.frombuffer(base64.b64decode(written["f64"]), dtype="<f8").reshape(written["shape"])
@@ -161,7 +156,7 @@ def same(segment: Any) -> Any:
 
 
 CONVERTERS: Mapping[type, tuple[Converter, ...]] = {
-    GliderState: (typed_dives, one_sea, one_level, with_legs, plain_names, foreseen_by_one_sea, with_spread),
+    GliderState: (typed_dives, one_sea, one_level, with_legs, plain_names, foreseen_by_one_sea),
     Segment: (same,),
 }
 """For each kind of record the way from layout 1 to today's: the n-th leads from layout n to n + 1. What is in
