@@ -36,8 +36,7 @@ def find_files(folders: Iterable[Path]) -> list[Path]:
     """
     found = {
         path: None
-        for folder in folders
-        for path in sorted([folder] if folder.is_file() else folder.rglob("*"))
+        for path in _below(folders)
         if kind(path.name) is not None and (path.is_symlink() or not path.is_dir())
     }
     return list(found)
@@ -45,10 +44,13 @@ def find_files(folders: Iterable[Path]) -> list[Path]:
 
 def packed(folders: Iterable[Path]) -> Path | None:
     """An archive at or below some folders, which may hold what was looked for; None: there is none."""
-    every = (
-        path for folder in folders for path in sorted([folder] if folder.is_file() else folder.rglob("*"))
-    )
-    return next((path for path in every if path.suffix.lower() in ARCHIVES), None)
+    return next((path for path in _below(folders) if path.suffix.lower() in ARCHIVES), None)
+
+
+def _below(folders: Iterable[Path], names: str = "*") -> Iterator[Path]:
+    """What lies below some folders, in order of their names; of one that is a file, that."""
+    for folder in folders:
+        yield from sorted([folder] if folder.is_file() else folder.rglob(names))
 
 
 def correct_clocks(jobs: Sequence[Job]) -> None:
@@ -118,8 +120,7 @@ def find_logs(folders: Iterable[Path]) -> list[Path]:
     """All logs of calls below some folders, each once."""
     found = {
         path.resolve() if path.is_symlink() else path: None
-        for folder in folders
-        for path in sorted([folder] if folder.is_file() else folder.rglob("*.[lL][oO][gG]"))
+        for path in _below(folders, "*.[lL][oO][gG]")
         if is_log(path.name) and not path.is_dir()
     }
     return list(found)
