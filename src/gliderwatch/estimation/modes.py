@@ -102,11 +102,11 @@ def switched(
 ) -> tuple[Mode, ...]:
     """The modes with the chances that they have after a dive which was explained so ``before``. ``turning``:
     the chance that the glider turned unseen, so that its ground velocity does not fit."""
+    least = {Cause.GROUND: turning}
     rare = (
-        (mode.cause, max(mode.chance, least, STAYS * before.get(mode.cause, 0.0)))
+        (mode.cause, max(mode.chance, least.get(mode.cause, 0.0), STAYS * before.get(mode.cause, 0.0)))
         for mode in modes
         if mode.cause.lasts
-        for least in (turning if mode.cause is Cause.GROUND else 0.0,)
     )
     return _with_chances(modes, tuple(rare))
 

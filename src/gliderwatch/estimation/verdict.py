@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
-from math import degrees, inf
+from math import degrees, inf, nan
 from statistics import median
 
 import numpy as np
@@ -234,13 +234,12 @@ def step(
     learnt = of_dives if params.learning else None
     normal = learnt or SpeedRange(params.low, (params.low + params.high) / 2, params.high, 0)
     roll = _roll_step(state, dive)
-    rolled = state.rolled + 1 if roll is not None and roll > ROLL_STEP else 0
+    rolled = state.rolled + 1 if roll > ROLL_STEP else 0
     usual = of_dives.usual if of_dives else None  # whatever the bounds are: a speed means one thing
     # the first of two dives may have been half over when it happened
-    hint = (LOST if roll is not None and roll > ROLL_LOST else ROLLED) if 1 <= rolled <= 2 else None
-    stays = roll is not None and roll < ROLL_STAYS
+    hint = (LOST if roll > ROLL_LOST else ROLLED) if 1 <= rolled <= 2 else None
     kinematic = kinematic_speed(state.ratios, dive.features)
-    estimate, info = kalman.step(state.filter, dive, params.joint, usual, hint, kinematic, stays)
+    estimate, info = kalman.step(state.filter, dive, params.joint, usual, hint, kinematic, roll < ROLL_STAYS)
     if info is None:
         flag, reason = _of_reckoning_alone(state, dive, kinematic, normal, params)
         return state, Verdict(flag, reason, normal, None)
@@ -451,11 +450,12 @@ def _how_slow(
     return words
 
 
-def _roll_step(state: SpeedState, dive: Dive) -> float | None:
-    """By how much (rad) the roll of a dive differs from the usual one; None where either is not known."""
+def _roll_step(state: SpeedState, dive: Dive) -> float:
+    """By how much (rad) the roll of a dive differs from the usual one; NaN, which is neither above nor below
+    a bound, where either is not known."""
     roll = dive.features.roll_mean
     if roll is None or dive.n_samples < BASELINE_LEAST or len(state.rolls) < BASELINE_LEAST:
-        return None
+        return nan
     return abs(roll - median(state.rolls))
 
 
