@@ -45,9 +45,10 @@ class Glider:
     (m/s, magnetic north) the current it reckons with; ``waypoint`` the index of its goal; ``lmc`` the
     origin of its local mission coordinates. ``against`` (unit vector) is the way of the current that
     sets against it; ``inflections`` counts, ``charge`` (A h) is used up; ``trim`` is what the water adds to
-    its drive, in units of `Scenario.drive_sigma`; ``variation`` is m_gps_mag_var (rad). ``rng`` moves the
-    glider, ``luck`` all that came to be simulated later, so that neither disturbs the other. ``yos`` are
-    flown one after another in each dive, the last without an end; none: to the depths of the scenario.
+    its drive, in units of `Scenario.drive_sigma`; ``variation`` is m_gps_mag_var (rad), ``declination``
+    (rad) what the World Magnetic Model has at the launch. ``rng`` moves the glider, ``luck`` all that came
+    to be simulated later, so that neither disturbs the other. ``yos`` are flown one after another in each
+    dive, the last without an end; none: to the depths of the scenario.
     """
 
     scenario: Scenario
@@ -73,13 +74,15 @@ class Glider:
     yos: tuple[Yo, ...] = ()
     health: Health = field(init=False)
     variation: float = field(init=False)
+    declination: float = field(init=False)
     trimming: np.random.Generator = field(init=False)
     timing: np.random.Generator = field(init=False)
 
     def __post_init__(self) -> None:
         self.health, self.trimming = self.scenario.health, self.scenario.rng(4)
         self.timing = self.scenario.rng(5)
-        self.variation = self.scenario.variation
+        self.variation, start = self.scenario.variation, self.scenario.start
+        self.declination = model_declination(*self.scenario.place, start)[0]
         self.trim = float(self.trimming.standard_normal())
 
     def wander_trim(self) -> None:
@@ -90,9 +93,8 @@ class Glider:
     def find_north(self) -> None:
         """Take the ``variation`` of the last fix: it changes along the way as the World Magnetic Model has
         it."""
-        s, t = self.scenario, self.time(self.cycle)
-        changed = model_declination(*self.fix, t)[0] - model_declination(*s.place, s.start)[0]
-        self.variation = s.variation - changed
+        here = model_declination(*self.fix, self.time(self.cycle))[0]
+        self.variation = self.scenario.variation - (here - self.declination)
 
     def turns(self) -> Iterator[tuple[float, float]]:
         """Upper and lower turn (m) of each leg of a dive, without end."""
