@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import errno
+import logging
 import os
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -45,6 +47,11 @@ from gliderwatch.slocum.folders import (
     kind,
     scan,
 )
+
+# The journal is read by people. Watchdog warns, with all that it watches, of each folder that it meets
+# twice, by its event and as it walks the folder above, and calls it an error that an emitter is stopped.
+warnings.filterwarnings("ignore", "Callback with id", RuntimeWarning)
+logging.getLogger("watchdog.observers.inotify").setLevel(logging.CRITICAL)
 
 _BESIDE = frozenset({"to-glider", "configuration"})
 """Folders beside `from-glider` without data: not polled, for a share may be slow."""
