@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import signal
 from collections.abc import Callable
@@ -12,7 +11,7 @@ from pathlib import Path
 from threading import Lock
 from typing import TypeVar
 
-from pebble import ProcessPool
+from gliderwatch.processes import Workers
 
 _Job = TypeVar("_Job")
 _Made = TypeVar("_Made")
@@ -27,7 +26,7 @@ class DrawingProcess:
 
     def __init__(self, niceness: int, warm: Callable[[], None] | None = None) -> None:
         self._niceness, self._warm = niceness, warm
-        self._pool: ProcessPool | None = None
+        self._pool: Workers | None = None
         self._lock = Lock()
 
     def begin(
@@ -37,12 +36,8 @@ class DrawingProcess:
         with self._lock:
             for _ in range(2):
                 if self._pool is None:
-                    self._pool = ProcessPool(
-                        max_workers=1,
-                        initializer=_prepare,
-                        initargs=(str(state.parent / "matplotlib"), self._niceness, self._warm),
-                        context=multiprocessing.get_context("spawn"),
-                    )
+                    cache = str(state.parent / "matplotlib")
+                    self._pool = Workers(1, _prepare, (cache, self._niceness, self._warm))
                 try:
                     made: Future[_Made] = self._pool.schedule(work, args=(job,), timeout=limit)
                     return made
@@ -57,8 +52,7 @@ class DrawingProcess:
 
     def _end(self) -> None:
         if self._pool is not None:
-            self._pool.stop()  # type: ignore[no-untyped-call]
-            self._pool.join()
+            self._pool.end()
             self._pool = None
 
 

@@ -8,7 +8,6 @@ committed if by then the same is to be processed (`service.transaction`).
 from __future__ import annotations
 
 import copyreg
-import multiprocessing
 import os
 import signal
 from collections.abc import Callable, Mapping, Sequence
@@ -17,12 +16,13 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
-from pebble import ProcessExpired, ProcessPool
+from pebble import ProcessExpired
 
 from gliderwatch.errors import GliderwatchError, NotAssessed, Retry
 from gliderwatch.model import Segment
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
+from gliderwatch.processes import Workers
 from gliderwatch.sea.ocean_field import Field
 from gliderwatch.store.codec import encode_state
 from gliderwatch.store.segments import Plan
@@ -97,15 +97,13 @@ class RunWorkers:
     """
 
     def __init__(self) -> None:
-        self._pool: ProcessPool | None = None
+        self._pool: Workers | None = None
 
     def submit(self, run: Run, params: GliderParams, is_kept: Sequence[bool]) -> Future[Processed]:
         """A run to be processed as by `processed_for_another`."""
         for _ in range(2):
             if self._pool is None:
-                context = multiprocessing.get_context("spawn")  # to fork a process with threads is unsafe
-                most = min(MOST, len(os.sched_getaffinity(0)))
-                self._pool = ProcessPool(max_workers=most, initializer=_prepare, context=context)
+                self._pool = Workers(min(MOST, len(os.sched_getaffinity(0))), _prepare)
             try:
                 args = (run, params, tuple(is_kept))
                 made: Future[Processed] = self._pool.schedule(processed_for_another, args=args, timeout=LIMIT)
@@ -117,8 +115,7 @@ class RunWorkers:
     def stop(self) -> None:
         """End the processes at once."""
         if self._pool is not None:
-            self._pool.stop()  # type: ignore[no-untyped-call]
-            self._pool.join()
+            self._pool.end()
             self._pool = None
 
 

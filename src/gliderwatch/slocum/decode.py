@@ -30,10 +30,11 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from pebble import ProcessExpired, ProcessPool
+from pebble import ProcessExpired
 
 from gliderwatch.errors import GliderwatchError, MissingCache, Quarantine, Retry
 from gliderwatch.model import Segment
+from gliderwatch.processes import Workers
 from gliderwatch.slocum import folders
 from gliderwatch.slocum.caches import Scratch, Staging, checksum
 from gliderwatch.slocum.cycles import Sensors, intact, parse_sensor_list
@@ -356,7 +357,7 @@ class Decoder:
             try:
                 inner = self._pool.schedule(_work, args=args)
             except RuntimeError:  # the pool gives up for good when a worker dies that has nothing to do
-                self._stop_pool()
+                self._pool.end()
                 self._pool = self._new_pool()
                 inner = self._pool.schedule(_work, args=args)
             self._pending.add(outer)
@@ -382,23 +383,14 @@ class Decoder:
             self._closed = True
         for future in tuple(self._pending):  # before the workers end: that would be a result of theirs
             future.cancel()
-        self._stop_pool()
+        self._pool.end()
         self._scratch.cleanup()
 
-    def _new_pool(self) -> ProcessPool:
-        pool = ProcessPool(
-            max_workers=self._max_workers,
-            initializer=_prepare,
-            initargs=(self._scratch.name, self._memory),
-            context=multiprocessing.get_context("spawn"),  # to fork a process with threads is unsafe
-        )
+    def _new_pool(self) -> Workers:
+        pool = Workers(self._max_workers, _prepare, (self._scratch.name, self._memory))
         if not pool.active:  # asking starts the workers, so that the first file does not wait for them
             raise RuntimeError("the worker processes of the decoder cannot be started")
         return pool
-
-    def _stop_pool(self) -> None:
-        self._pool.stop()  # type: ignore[no-untyped-call]
-        self._pool.join()
 
 
 def _prepare(scratch: str, memory: int) -> None:
