@@ -1,4 +1,4 @@
-"""Processes that work for the daemon: begun afresh (to fork one with threads is unsafe), and ended at once."""
+"""Processes that work for the daemon: begun afresh, as a fork with threads is unsafe, and ended at once."""
 
 from __future__ import annotations
 
