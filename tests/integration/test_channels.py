@@ -236,6 +236,7 @@ class TestMail:
         with pytest.raises(DeliveryError, match="refused"):
             Channel("mail", Post().url()).send(alert())
 
+    @pytest.mark.timing
     def test_server_that_says_nothing_is_left_in_time(self) -> None:
         with socket.create_server(("127.0.0.1", 0)) as silent:
             url = (
@@ -366,6 +367,7 @@ class TestWithDispatcher:
         made.start()
         return made, wake
 
+    @pytest.mark.timing
     def test_mail_arrives_within_a_second_of_the_commit(self, post: Post) -> None:
         store = MemoryStore()
         dispatcher, wake = self.deliver(store, {"mail": Channel("mail", post.url())})
@@ -400,6 +402,7 @@ class TestWithDispatcher:
         assert sent == [message_id(f"a{i}", "watch@example.org") for i in range(3)]
         assert store.marked == rows
 
+    @pytest.mark.timing
     def test_a_dead_webhook_does_not_delay_the_mail(self, post: Post) -> None:
         store = MemoryStore()
         with socket.create_server(("127.0.0.1", 0)) as silent:

@@ -214,6 +214,7 @@ class TestHttp:
             assert [(u.alert, str(code) in u.error) for u in store.refused(0.0)] == [("a", True)]
 
 
+@pytest.mark.timing
 def test_a_slow_channel_delays_no_other(state: Path) -> None:
     """Ten messages: on the slow channel 4 s each, on the quick one at once. Prints what it measured."""
     slow, quick = Box(slow=4.0), Box()

@@ -413,6 +413,7 @@ def test_a_worker_that_dies_idle_is_replaced(station):
         assert all(error is None or isinstance(error, Retry) for error in outcome)
 
 
+@pytest.mark.timing
 @pytest.mark.parametrize("name", ["hang", "hang-in-c"])
 def test_closing_does_not_wait_for_a_hanging_task(station, name):
     path, cache = station

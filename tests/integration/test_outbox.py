@@ -59,6 +59,7 @@ def running(
         made.stop()
 
 
+@pytest.mark.timing
 def test_wakes_at_once_and_marks_after_sending() -> None:
     store, channel = MemoryStore(), FakeChannel()
     with running(store, {"mail": channel}) as (_, wake):
@@ -145,6 +146,7 @@ def test_the_loudest_goes_first() -> None:
     assert channel.sent == ["CRITICAL", "WARNING", "INFO"]
 
 
+@pytest.mark.timing
 def test_stops_in_time_though_a_send_hangs_and_leaves_its_row() -> None:
     channel, store = FakeChannel(), MemoryStore()
     channel.gate.clear()

@@ -34,6 +34,7 @@ def configured(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.timing
 def test_what_hangs_dies_or_fails_holds_up_no_other_page(folder: Path) -> None:
     news: SimpleQueue[object] = SimpleQueue()
     writer = PageWriter(news.put, misbehave, limit=1.0)

@@ -18,6 +18,7 @@ ALLOWED = {
     "Sent.computer": "rules of health read it next",
     "_Warnings.emit": "logging calls it",
     "_Handler.on_any_event": "watchdog calls it",
+    "_Context.Process": "pebble begins processes by it",
 }
 """Defined, not read by name in src, and why it stays."""
 
