@@ -136,7 +136,7 @@ class TestOpening:
         assert after.opened_at < before.opened_at, "today's estimator sees it sooner"
         assert len(made) == 31
 
-    @pytest.mark.parametrize("schema", [4, 7, 10, 12])
+    @pytest.mark.parametrize("schema", [4, 7, 10, 12, 14])
     def test_a_state_file_that_was_cut_is_gone_on_from(self, path, schema):
         """`keep_days` has removed what was before its first checkpoint: that is read, not made again. What
         comes next gives dives, flags and the incident that the code that wrote it made of the same segments;

@@ -33,7 +33,7 @@ from gliderwatch.estimation.kalman import (
 from gliderwatch.estimation.kinematic_speed import Ratios, kinematic_speed, vertical
 from gliderwatch.estimation.kinematic_speed import learn as learn_ratios
 from gliderwatch.estimation.modes import MODES, Cause, switched
-from gliderwatch.estimation.speed_range import Normal, RangeParams, SpeedRange, speed_range
+from gliderwatch.estimation.speed_range import Drive, Normal, RangeParams, SpeedRange, speed_range
 from gliderwatch.estimation.step_test import Bank, Update, ratio_bound, steps
 from gliderwatch.estimation.unassessed import Reference, of_model
 from gliderwatch.estimation.verdict import (
@@ -42,7 +42,7 @@ from gliderwatch.estimation.verdict import (
     SpeedParams,
     SpeedState,
     blame,
-    retrimmed,
+    slowed,
     step,
 )
 from gliderwatch.model import Current, Dive, DiveFeatures, Fix, Flag, readonly
@@ -363,7 +363,8 @@ class TestKinematicSpeed:
 
 class TestNormal:
     def range(self, speeds: list[float], settings: list[float], at: float = 0.0) -> SpeedRange | None:
-        return speed_range(Normal(readonly(speeds), readonly(settings)), at, RangeParams())
+        volumes = readonly(np.zeros((len(speeds), 2)))
+        return speed_range(Normal(readonly(speeds), readonly(settings), volumes), Drive(at), RangeParams())
 
     def test_a_narrow_and_a_wide_range(self):
         narrow = self.range([0.2] * 9, [0.0] * 9)
@@ -376,8 +377,8 @@ class TestNormal:
         found = self.range([0.2, 0.206, 0.194] * 5, [0.0] * 15)
         assert found.usual - found.low == pytest.approx(4 * 0.006 / 0.67449, rel=1e-3)
 
-    @pytest.mark.parametrize(("apart", "counts"), [(0.09, True), (0.11, False)])
-    def test_settings_of_a_thruster_a_tenth_apart_are_alike(self, apart, counts):
+    @pytest.mark.parametrize(("apart", "counts"), [(0.04, True), (0.06, False)])
+    def test_settings_of_a_thruster_a_twentieth_apart_are_alike(self, apart, counts):
         speeds, settings = [0.2, 0.2, 0.4], [0.5, 0.5, 0.5 - apart]
         assert (self.range(speeds, settings, 0.5) is not None) == counts
 
@@ -438,6 +439,12 @@ class TestNormal:
         vacuum=30e3,
     )
 
+    @pytest.mark.parametrize(("apart", "counts"), [(0.09, True), (0.11, False)])
+    def test_settings_of_a_thruster_a_tenth_apart_are_compared(self, apart, counts):
+        known = self.taught(replace(self.FEATURES, thruster=0.5))
+        found = compare(known, replace(self.FEATURES, thruster=0.5 - apart))
+        assert ("roll_mean" in found) == counts
+
     def taught(self, features: DiveFeatures = FEATURES, n: int = 6) -> Baseline:
         known = Baseline()
         for _ in range(n):
@@ -464,14 +471,19 @@ class TestVerdict:
         for k in (0, 1):
             before = [-0.45, 0.45, None, None]
             now = [p + change * (i == k) if p is not None else None for i, p in enumerate(before)]
-            assert retrimmed(tuple(before), tuple(now)) == known
+            assert slowed(tuple(before), tuple(now)) == known
 
     @pytest.mark.parametrize(("change", "known"), [(25e-6, False), (35e-6, True)])
     def test_ballast_is_changed_by_30_cm3(self, change, known):
         for k in (2, 3):
             before = (None, None, -2e-4, 2e-4)
             now = tuple(p + change * (i == k) if p is not None else None for i, p in enumerate(before))
-            assert retrimmed(before, now) == known
+            assert slowed(before, now) == known
+
+    @pytest.mark.parametrize(("dive", "climb", "known"), [(25e-6, 31e-6, True), (31e-6, 31e-6, False)])
+    def test_30_cm3_more_slow_no_glider(self, dive, climb, known):
+        before, now = (-0.45, 0.45, -2e-4, 2e-4), (-0.35, 0.35, -2e-4 - dive, 2e-4 + climb)
+        assert slowed(before, now) == known
 
     @pytest.mark.parametrize(("faster", "n", "new"), [(1.6, 3, True), (1.6, 2, False)])
     def test_three_dives_make_a_new_way_of_flying(self, faster, n, new):
@@ -702,8 +714,23 @@ class TestSureness:
         )
         seen = SimpleNamespace(is_free=False, own_speed=lambda: (0.25, sigma))
         info = SimpleNamespace(seen=seen, proven=None)
-        after = verdict._learnt(SpeedState(), flown, info, 0.0, speed_params(GliderParams()))
+        configured = SpeedRange(0.15, 0.45, 0.75, 0)
+        after = verdict._learnt(
+            SpeedState(), flown, info, Drive(0.0), configured, speed_params(GliderParams())
+        )
         assert bool(after.ratios.onboard) == learns
+
+    @pytest.mark.parametrize(
+        ("speed", "dives", "teaches"), [(0.21, 5, True), (0.19, 5, False), (0.19, 0, True)]
+    )
+    def test_a_dive_below_the_learnt_range_does_not_make_its_speed_usual(self, speed, dives, teaches):
+        """Though it is not surely below; one below a configured range does."""
+        seen = SimpleNamespace(is_free=False, own_speed=lambda: None)
+        info = SimpleNamespace(seen=seen, proven=None, estimate=SimpleNamespace(speed=speed))
+        flown = SimpleNamespace(features=DiveFeatures(duration=3 * HOUR))
+        normal = SpeedRange(0.2, 0.25, 0.33, dives)
+        after = verdict._learnt(SpeedState(), flown, info, Drive(0.0), normal, speed_params(GliderParams()))
+        assert bool(len(after.normal.speeds)) == teaches
 
 
 @pytest.mark.parametrize(("widths", "is_kept"), [(5.5, True), (6.5, False)])

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gliderwatch.estimation.constants import FORGOTTEN, STALE, WARM_UP
-from gliderwatch.estimation.speed_range import Normal, RangeParams, learn, setting, speed_range
+from gliderwatch.estimation.speed_range import Normal, RangeParams, drive, learn, speed_range
 from gliderwatch.estimation.unassessed import Reference, unassessed
 from gliderwatch.model import Array, Assessment, Current, Dive, Fix, Flag, Track, readonly
 from gliderwatch.navigation.geodesy import from_plane, to_plane
@@ -92,7 +92,7 @@ def step(
         judged = replace(judged, notes=(*judged.notes, *other.notes))
     if params.speed_learnt and judged.flag == Flag.NORMAL and not frozen:
         duration = dive.features.duration
-        normal = learn(state.normal, info.speed, setting(dive.features), duration, RangeParams())
+        normal = learn(state.normal, info.speed, drive(dive.features), duration, RangeParams())
         state = replace(state, normal=normal)
     return state, replace(judged, evidence={**judged.evidence, **_past(before)})
 
@@ -139,7 +139,7 @@ def _with_range(state: Learner, dive: Dive, params: GliderParams) -> GliderParam
     """The parameters with the range of speed that was learnt, once there is one."""
     if not params.speed_learnt:
         return params
-    found = speed_range(state.normal, setting(dive.features), RangeParams())
+    found = speed_range(state.normal, drive(dive.features), RangeParams())
     return params if found is None else replace(params, speed_min=found.low, speed_max=found.high)
 
 

@@ -227,7 +227,12 @@ ONBOARD_LIES = 0.1
 
 # What is normal
 LIKE = 0.1
-"""Settings of a thruster (0 to 1) that differ by less are alike."""
+"""Settings of a thruster (0 to 1) that differ by less are alike,"""
+NEAR = 0.05
+"""and have one normal speed: 0.4 m/s at one is 0.42 at the other."""
+LEAST_THRUST = 0.4
+"""m2/s2: of `THRUST` what is counted on at a setting that was never flown. Half of it, as a range that is too
+high is a false alarm, and one that is too low is not noticed: between 0.3 and 0.55 the same is told."""
 SHORTEST = 3600.0
 """s: a shorter dive teaches nothing: turns and surface take too much of it, and after launch pilots try out
 the ballast."""

@@ -141,7 +141,7 @@ class JointState:
     ``t`` end of the last dive (s), ``x`` ((n,)) and ``cov`` ((n, n)) of the state; ``process_scale`` factor
     on the variance of the flow's changes and ``measurement_scale`` on that of the measurements, both learnt
     (the tests use `tested`); ``dives`` used; ``bank`` of the test for a step; ``end`` the fix that ended the
-    last dive; ``wrong`` how likely each of the causes that last explained it.
+    last dive; ``lasting`` how likely each cause that lasts explained it.
     """
 
     t: float
@@ -152,7 +152,7 @@ class JointState:
     dives: int = 0
     bank: Bank = field(default_factory=Bank)
     end: Fix | None = None
-    wrong: dict[Cause, float] = field(default_factory=dict)
+    lasting: dict[Cause, float] = field(default_factory=dict)
 
     @property
     def tested(self) -> float:
@@ -271,7 +271,7 @@ def step(
 def _explained(state: JointState, measured: Measured, params: JointParams, hint: Mode | None) -> Explanations:
     """A dive in all modes; ``hint``: also in this one."""
     jumped, shown = _jumped(params.flow)[-SHOWN:, -SHOWN:], state.cov[-SHOWN:, -SHOWN:]
-    modes = (*switched(params.modes, state.wrong, measured.seen.turning), *((hint,) if hint else ()))
+    modes = (*switched(params.modes, state.lasting, measured.seen.turning), *((hint,) if hint else ()))
     return Explanations.of(explain(state.x[-SHOWN:], shown, jumped, measured, modes))
 
 
@@ -412,7 +412,7 @@ def _learnt(
     end: Fix | None,
 ) -> JointState:
     """The state of which ``mixed`` is the mixture, with what a dive adds to the noise learnt in ``state`` and
-    to what was wrong."""
+    to what lasts."""
     square, share = _surprise(state, found, passage)
     aside = None
     if not found.best.cause.is_error and across is not None:
@@ -425,7 +425,7 @@ def _learnt(
         dives=state.dives + 1,
         bank=bank,
         end=end,
-        wrong={each: found.odds[str(each)] for each in Cause if each.lasts and str(each) in found.odds},
+        lasting={each: found.odds[str(each)] for each in Cause if each.lasts and str(each) in found.odds},
     )
 
 

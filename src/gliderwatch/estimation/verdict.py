@@ -42,12 +42,13 @@ from gliderwatch.estimation.kinematic_speed import KinematicSpeed, Ratios, kinem
 from gliderwatch.estimation.kinematic_speed import learn as learn_ratios
 from gliderwatch.estimation.modes import LOST, ROLLED, Cause
 from gliderwatch.estimation.speed_range import (
+    Drive,
     Normal,
     RangeParams,
     SpeedRange,
+    drive,
     learn,
     renewed,
-    setting,
     speed_range,
 )
 from gliderwatch.estimation.step_test import cusum, cusum_bound
@@ -190,7 +191,7 @@ class SpeedState:
 
     ``filter``, the Kalman filter's (None: no dive yet), ``normal`` speeds learnt, ``rolls`` (rad) of the
     first healthy dives, ``rolled`` dives in a row that roll otherwise, ``slow`` Page's sum of small losses,
-    ``doubted`` (1 or 0) whether the dive before was slow, surely or in doubt, ``misfits`` of the last dives,
+    ``was_slow`` whether the dive before was slow, surely or in doubt, ``misfits`` of the last dives,
     ``ratios`` of the speed to what the glider tells of it; ``trim`` of the last normal dive, ``other`` speeds
     (m/s) of the last dives in a row that may be a new way of flying.
     """
@@ -200,7 +201,7 @@ class SpeedState:
     rolls: tuple[float, ...] = ()
     rolled: int = 0
     slow: float = 0.0
-    doubted: int = 0
+    was_slow: bool = False
     misfits: tuple[Misfit, ...] = ()
     ratios: Ratios = Ratios()
     trim: Trim = ()
@@ -229,7 +230,7 @@ def step(
 
     ``frozen``: an incident is open, so that nothing is learnt of what is normal.
     """
-    at = setting(dive.features)
+    at = drive(dive.features)
     of_dives = speed_range(state.normal, at, params.learning or RangeParams())
     learnt = of_dives if params.learning else None
     normal = learnt or SpeedRange(params.low, (params.low + params.high) / 2, params.high, 0)
@@ -258,7 +259,7 @@ def step(
     state, flag, reason, normal = _regime(state, dive, info, kinematic, normal, flag, reason, params)
     before = earlier.usual if reason.startswith(NEW_WAY) else None
     if flag is Flag.NORMAL and not frozen and not state.other:
-        state = _learnt(state, dive, info, at, params)
+        state = _learnt(state, dive, info, at, normal, params)
     # where the way hardly shows the speed, it is depth rate and pitch that a new way of flying is seen by
     is_hidden = before is not None and info.estimate.speed < normal.low
     reckoned = _reckoned(kinematic, params) if is_hidden and kinematic is not None else None
@@ -295,7 +296,7 @@ def _regime(
     is_vague = info.estimate.own_sigma > OWN_SURE * normal.usual or has_turned
     if is_vague and not faster and kinematic is not None and kinematic.is_prompt:
         speed = kinematic.speed * (1 - _usual_slip(params))
-    explained = speed > EXPLAINED * normal.usual and retrimmed(state.trim, _trim(dive))
+    explained = speed > EXPLAINED * normal.usual and slowed(state.trim, _trim(dive))
     is_slow = flag is Flag.ANOMALY or has_turned or (is_vague and speed < normal.low)
     slower = is_slow and explained and kinematic is not None and (info.kinematic_fits or has_turned)
     if learning is None or not normal.dives or not (faster or slower):
@@ -307,8 +308,8 @@ def _regime(
         if flag is Flag.NORMAL:
             return replace(state, other=row), flag, reason, normal
         return replace(state, other=row), None, NEW_FASTER if faster else NEW_SLOWER, normal
-    at = setting(dive.features)
-    state = replace(state, normal=renewed(state.normal, row, at), other=(), slow=0.0, doubted=0)
+    at = drive(dive.features)
+    state = replace(state, normal=renewed(state.normal, row, at), other=(), slow=0.0, was_slow=False)
     new = speed_range(state.normal, at, learning) or normal
     words = f"{NEW_WAY}{speed:.2f} m/s is its normal speed now, unless you say otherwise"
     return state, Flag.NORMAL, words, new
@@ -319,14 +320,21 @@ def _trim(dive: Dive) -> Trim:
     return (f.pitch_dive, f.pitch_climb, f.ballast_dive, f.ballast_climb)
 
 
-def retrimmed(before: Trim, now: Trim) -> bool:
-    """Whether the pilot changed pitch or ballast between two dives.
+def slowed(before: Trim, now: Trim) -> bool:
+    """Whether what the pilot changed between two dives can have slowed the glider: pitch or ballast, but not
+    where more of it is pumped.
 
-    >>> retrimmed((-0.45, 0.45, None, None), (-0.35, 0.36, None, None))
+    >>> slowed((-0.45, 0.45, None, None), (-0.35, 0.36, None, None))
     True
-    >>> retrimmed((), (-0.45, 0.45, None, None))
+    >>> slowed((-0.45, 0.45, -250e-6, 260e-6), (-0.35, 0.36, -400e-6, 420e-6))
+    False
+    >>> slowed((), (-0.45, 0.45, None, None))
     False
     """
+    volumes = zip(before[2:], now[2:], RETRIMMED[2:], strict=False)
+    more = [(abs(b) - abs(a)) / least for a, b, least in volumes if a is not None and b is not None]
+    if sum(more) > len(more):
+        return False
     pairs = zip(before, now, RETRIMMED, strict=False)
     return any(a is not None and b is not None and abs(a - b) > least for a, b, least in pairs)
 
@@ -395,11 +403,11 @@ def _slow_or_fast(
     sigma *= ROLL_CONFIRMS if state.rolled > 1 else params.confidence
     if info.estimate.speed + sigma < normal.low:
         # depth rate and pitch would be slow as well; where they are not sent a second dive has to be slow
-        unseen = info.seen.is_free and (kinematic is not None or not state.doubted)
-        if believed is None and (unseen or (not state.doubted and _may_have_turned(info, normal))):
-            return replace(state, doubted=1), None, SLOW_OR_TURNED
-        return replace(state, doubted=1), Flag.ANOMALY, _how_slow(info, normal, params)
-    state = replace(state, doubted=0) if state.doubted else state
+        unseen = info.seen.is_free and (kinematic is not None or not state.was_slow)
+        if believed is None and (unseen or (not state.was_slow and _may_have_turned(info, normal))):
+            return replace(state, was_slow=True), None, SLOW_OR_TURNED
+        return replace(state, was_slow=True), Flag.ANOMALY, _how_slow(info, normal, params)
+    state = replace(state, was_slow=False) if state.was_slow else state
     if info.estimate.speed - sigma > normal.high:
         if normal.dives:
             return state, Flag.FALSE_ALARM, FASTER
@@ -459,17 +467,24 @@ def _roll_step(state: SpeedState, dive: Dive) -> float:
     return abs(roll - median(state.rolls))
 
 
-def _learnt(state: SpeedState, dive: Dive, info: JointInfo, at: float, params: SpeedParams) -> SpeedState:
-    """The state with what a normal dive teaches."""
-    roll, rolls, ratios, normal = dive.features.roll_mean, state.rolls, state.ratios, state.normal
+def _learnt(
+    state: SpeedState, dive: Dive, info: JointInfo, at: Drive, normal: SpeedRange, params: SpeedParams
+) -> SpeedState:
+    """The state with what a normal dive teaches.
+
+    One below the ``normal`` range, though not surely, teaches no speed: a loss that is half seen would
+    become normal.
+    """
+    roll, rolls, ratios, speeds = dive.features.roll_mean, state.rolls, state.ratios, state.normal
     if roll is not None and len(rolls) < 3 * BASELINE_LEAST:
         rolls = (*rolls, roll)
     own = info.seen.own_speed()
     if own is not None and own[1] < (2 if info.seen.is_free else 1) * OWN_SURE * own[0]:
         ratios = learn_ratios(ratios, dive.features, own[0])
     # where a surfacing was not seen several dives are one, perhaps the short ones of a launch
-    if info.proven is None and not dive.features.surfacing_unseen:
+    is_low = normal.dives and info.estimate.speed < normal.low
+    if info.proven is None and not dive.features.surfacing_unseen and not is_low:
         before = state.filter.dives - 1 if state.filter else 0
         learning = params.learning or RangeParams()
-        normal = learn(normal, info.estimate.speed, at, dive.features.duration, learning, before)
-    return replace(state, rolls=rolls, ratios=ratios, normal=normal, trim=_trim(dive))
+        speeds = learn(speeds, info.estimate.speed, at, dive.features.duration, learning, before)
+    return replace(state, rolls=rolls, ratios=ratios, normal=speeds, trim=_trim(dive))

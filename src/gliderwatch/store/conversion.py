@@ -139,6 +139,23 @@ def foreseen_by_one_sea(state: Any) -> Any:
     return state
 
 
+def driven_dives(state: Any) -> Any:
+    """Layout 7 to 8: healthy dives have the volumes pumped, not known of those that were; what lasts and what
+    was slow is called so."""
+    for memory in (state.get("settled", {}), state.get("memory", {})):
+        estimate = memory.get("estimate", {})
+        for part in (estimate.get("speed", {}), estimate.get("learner", {})):
+            if (normal := part.get("normal")) is not None and "speeds" in normal:
+                dives = len(_array(normal["speeds"]))
+                normal["volumes"] = _written(np.zeros((dives, 2)))
+        speed = estimate.get("speed", {})
+        if "doubted" in speed:
+            speed["was_slow"] = bool(speed.pop("doubted"))
+        if "wrong" in (speed.get("filter") or {}):
+            moved(speed["filter"], "wrong", "lasting")
+    return state
+
+
 def _array(written: Mapping[str, Any]) -> Array:
     """An array as a record holds it."""
     return np.frombuffer(base64.b64decode(written["f64"]), dtype="<f8").reshape(written["shape"])
@@ -156,7 +173,15 @@ def same(segment: Any) -> Any:
 
 
 CONVERTERS: Mapping[type, tuple[Converter, ...]] = {
-    GliderState: (typed_dives, one_sea, one_level, with_legs, plain_names, foreseen_by_one_sea),
+    GliderState: (
+        typed_dives,
+        one_sea,
+        one_level,
+        with_legs,
+        plain_names,
+        foreseen_by_one_sea,
+        driven_dives,
+    ),
     Segment: (same,),
 }
 """For each kind of record the way from layout 1 to today's: the n-th leads from layout n to n + 1. What is in

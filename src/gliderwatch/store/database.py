@@ -127,7 +127,7 @@ __all__ = [
     "schema",
 ]
 
-SCHEMA = 14
+SCHEMA = 15
 DELIVERY_BY_WORDS = """CASE
     WHEN delivered_at IS NULL THEN 'pending' WHEN error = '' THEN 'delivered'
     WHEN error LIKE 'withdrawn: %' THEN 'withdrawn' WHEN error LIKE 'given up: %' THEN 'unreadable'
@@ -323,6 +323,7 @@ CREATE TABLE relays (             -- how it stands with the exchange of batches:
 """,
     13: "",  # checkpoints are of layout 5
     14: "",  # checkpoints are of layout 6
+    15: "",  # checkpoints are of layout 8
 }
 """SQL that leads from the schema before to the one of the key. It may call the functions of
 `conversion.ROW_CONVERTERS`. Only the 2nd sets checkpoints to NULL: nothing before it had `state.keep_days`,
