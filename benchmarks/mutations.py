@@ -37,7 +37,7 @@ TESTS = {
     "sea": "unit/test_heuristics_sea unit/test_gauss_markov unit/test_ocean_field unit/test_tides",
     "estimation": "unit/test_heuristics_estimation unit/test_verdict_misfit unit/test_speed_range"
     " unit/test_healthy_baseline unit/test_kinematic_speed unit/test_step_test unit/test_adaptive"
-    " unit/test_verdict unit/test_kalman unit/test_glider_estimate",
+    " unit/test_verdict unit/test_kalman unit/test_glider_estimate unit/test_surface_drift",
     "layers": "unit/test_heuristics_layers unit/test_layers unit/test_layer_advice unit/test_casts",
     "fleet": "unit/test_heuristics_fleet unit/test_fleet_flow unit/test_cross_check unit/test_fleet_field"
     " unit/test_fleet_advice unit/test_fleet_batches unit/test_fleet_reference unit/test_exchange",

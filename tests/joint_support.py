@@ -12,6 +12,8 @@ from gliderwatch.navigation.geodesy import from_plane
 
 START = 1_700_000_000.0
 HOUR, DAY = 3600.0, 86400.0
+SURFACE = 600.0
+"""s at the surface between two dives."""
 LAT, LON = 27.5, -84.0
 FEATURES = DiveFeatures(duration=3 * HOUR, pitch_dive=-0.45, pitch_climb=0.45, roll_mean=0.0)
 
@@ -38,7 +40,7 @@ class Way:
 
 def dive(k: int, way: Way, hours: float = 3.0, samples: int = 24, start: Fix | None = None) -> Dive:
     """The ``k``-th dive of a mission of dives of equal length, 10 minutes apart."""
-    t0 = START + k * (hours * HOUR + 600)
+    t0 = START + k * (hours * HOUR + SURFACE)
     angles = np.repeat(np.atleast_1d(way.heading), -(-samples // np.size(way.heading)))[:samples]
     vectors = np.column_stack([np.cos(angles), np.sin(angles)])
     t = np.linspace(t0, t0 + hours * HOUR, samples + 1)
@@ -64,11 +66,16 @@ def dive(k: int, way: Way, hours: float = 3.0, samples: int = 24, start: Fix | N
     )
 
 
-def mission(ways: Sequence[Way], hours: float = 3.0) -> list[Dive]:
-    """Dives one after another, each from where the one before ended."""
+def mission(ways: Sequence[Way], hours: float = 3.0, wind: tuple[float, float] = (0.0, 0.0)) -> list[Dive]:
+    """Dives one after another, each from where the glider has drifted to with the flow and ``wind`` (m/s)."""
     out: list[Dive] = []
+    start = None
     for k, way in enumerate(ways):
-        out.append(dive(k, way, hours, start=out[-1].end if out else None))
+        out.append(dive(k, way, hours, start=start))
+        end = out[-1].end
+        assert end is not None
+        drift = SURFACE * (np.array(way.flow) + wind)
+        start = Fix(end.t + SURFACE, *from_plane(drift, end.lat, end.lon))
     return out
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from gliderwatch.estimation.verdict import SpeedParams, SpeedState, step
 from gliderwatch.model import Current, Dive, readonly
-from gliderwatch.navigation.geodesy import from_plane
+from gliderwatch.navigation.geodesy import displacement, from_plane
 from gliderwatch.store import codec
 from joint_support import Way, mission
 
@@ -63,9 +63,14 @@ def turned(all_dives: list[Dive], angle: float) -> list[Dive]:
         current = dive.current
         if current is not None:
             current = Current(*(matrix @ [current.u, current.v]).tolist(), final=current.final)
-        at = out[-1].end if out else dive.start
+        at = dive.start
+        if out:
+            before, turned_before = all_dives[len(out) - 1].end, out[-1].end
+            drift = matrix @ displacement(at.lat, at.lon, before.lat, before.lon)
+            lat, lon = from_plane(drift, turned_before.lat, turned_before.lon)
+            at = replace(at, lat=lat, lon=lon)
         lat, lon = from_plane(x[-1], at.lat, at.lon)
-        start, end = replace(dive.start, lat=at.lat, lon=at.lon), replace(dive.end, lat=lat, lon=lon)
+        start, end = at, replace(dive.end, lat=lat, lon=lon)
         out.append(replace(dive, track=track, current=current, start=start, end=end))
     return out
 

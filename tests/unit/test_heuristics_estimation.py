@@ -558,7 +558,7 @@ class TestSeveralDives:
         """After one dive whose four measurements show the four numbers of a step, each to 1 m/s."""
         update = Update(np.eye(4, 6), np.zeros((6, 4)), np.eye(4), np.array([innovation, 0.0, 0.0, 0.0]))
         jump = np.concatenate([np.eye(2), np.zeros((4, 2))])
-        return steps(Bank(), np.eye(6), update, jump, JointParams().front, 0)[2]
+        return steps(Bank(), np.eye(6), update, jump, JointParams().front, 0.0, 0)[2]
 
     def test_sizes_of_a_step(self):
         """Slip and side change by 0.5, the flow with them by 0.25 m/s."""
@@ -566,7 +566,7 @@ class TestSeveralDives:
 
     def unseen(self) -> Bank:
         update = Update(np.zeros((1, 6)), np.zeros((6, 1)), np.eye(1), np.zeros(1))
-        return steps(Bank(), np.eye(6), update, np.zeros((6, 2)), JointParams().front, 0)[2]
+        return steps(Bank(), np.eye(6), update, np.zeros((6, 2)), JointParams().front, 0.0, 0)[2]
 
     def test_no_dive_alone_proves_a_step(self):
         assert np.array_equal(self.bank(4.0).score, self.bank(40.0).score)

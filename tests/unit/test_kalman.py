@@ -269,6 +269,22 @@ def test_hidden_loss_is_found_when_the_heading_changes(seed):
     assert infos[-1].estimate.speed == pytest.approx(0.115, abs=3 * infos[-1].estimate.sigma)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_drift_at_the_surface_tells_a_lost_wing_from_a_sea_that_turns_with_the_glider(seed):
+    """All that dives measure is alike: the reported current is the sea's, or what the wing takes."""
+    lost, well = [], []
+    for k, flow in enumerate(wandering(40, seed, size=0.04)):
+        heading = 0.0 if k < 24 else 1.6
+        taken = 0.37 * 0.25 * np.array([math.cos(heading), math.sin(heading)]) * (k >= 14)
+        lost.append(Way(heading, speed=0.23 - 0.37 * 0.25 * (k >= 14), flow=tuple(flow)))
+        well.append(Way(heading, flow=tuple(flow - taken)))
+    dives = mission(lost), mission(well)
+    assert dives[0][30].current.u == pytest.approx(dives[1][30].current.u)
+    ratios = [max(info.loss.ratio for info in run(each)[1]) for each in dives]
+    assert ratios[0] > 14
+    assert ratios[1] < 8
+
+
 def test_hidden_loss_on_a_steady_course_is_not_made_up():
     """Nothing can tell it from a flow that changed: the test stays silent."""
     _, infos = run(mission(lost_wing(1, lambda k: 0.4)))

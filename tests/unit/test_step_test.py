@@ -50,7 +50,7 @@ def misfit(updates):
 def banked(updates, precision):
     bank = Bank()
     for dives, update in enumerate(updates):
-        bank = advance(bank, SHAPE, precision, np.diag(KEPT), update, dives)
+        bank = advance(bank, SHAPE, precision, np.diag(KEPT), update, 10800.0 * dives, dives)
     return bank
 
 
@@ -90,6 +90,7 @@ def test_likeliest_finds_dive_and_size_of_a_step():
     (at,) = np.flatnonzero((bank.score == found.score).all(axis=1))
     assert at in (8, 9, 10)  # just before the tenth of sixteen
     assert found.size == pytest.approx(2.0, abs=3 * found.sigma)
+    assert found.begun == 10800.0 * at
     assert found.ratio > 50
     # the filter has found part of it by itself: the shift is what is left
     assert x[1] + found.shift[1] == pytest.approx(2.0, abs=3 * found.sigma)

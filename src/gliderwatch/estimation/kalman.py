@@ -8,7 +8,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from gliderwatch.estimation import step_test
+from gliderwatch.estimation import step_test, surface_drift
 from gliderwatch.estimation.constants import (
     FAR,
     FASTEST,
@@ -56,6 +56,7 @@ from gliderwatch.estimation.modes import (
     switched,
 )
 from gliderwatch.estimation.step_test import Bank, Step, Update
+from gliderwatch.estimation.surface_drift import Drifts
 from gliderwatch.model import Array, Dive, Fix, readonly, replace
 from gliderwatch.sea import gauss_markov
 from gliderwatch.sea.gauss_markov import FlowParams, Passage
@@ -141,7 +142,8 @@ class JointState:
     ``t`` end of the last dive (s), ``x`` ((n,)) and ``cov`` ((n, n)) of the state; ``process_scale`` factor
     on the variance of the flow's changes and ``measurement_scale`` on that of the measurements, both learnt
     (the tests use `tested`); ``dives`` used; ``bank`` of the test for a step; ``end`` the fix that ended the
-    last dive; ``lasting`` how likely each cause that lasts explained it.
+    last dive and ``way`` W h on it (m/s, (2,)); ``lasting`` how likely each cause that lasts explained it;
+    ``drifts`` at the surface.
     """
 
     t: float
@@ -153,6 +155,8 @@ class JointState:
     bank: Bank = field(default_factory=Bank)
     end: Fix | None = None
     lasting: dict[Cause, float] = field(default_factory=dict)
+    way: Array = field(default_factory=lambda: readonly(np.zeros(2)))
+    drifts: Drifts = Drifts()
 
     @property
     def tested(self) -> float:
@@ -233,6 +237,7 @@ def step(
     seen = observe(dive)
     if state is None:
         state = init(params, seen.start)
+    drifts = _drifted(state, dive.start, params)
     passage = _passage(state, seen.start, seen.end, dive.start.lat, params)
     state = _predicted(state, seen.end, tuple(seen.ground.tolist()), passage, params)
     believed = seen.own_speed()
@@ -245,13 +250,16 @@ def step(
     slipping = Slipping(params.slip * seen.slip, noise, usual)
     found = _explained(state, Measured(seen, kinematic, state.tested, slipping), params, hint)
     across = _across(state, seen, believed)
-    loss, turn, bank = _tested(state, found, passage, params)
+    loss, turn, bank = _tested(state, found, passage, seen.start, params)
     # a loss that the glider does not know of is that of a wing: where the roll stays it is the sea's; and
     # where no heading was measured, what looks like a step is a turn that was not seen
+    loss, turn = _weighed(loss, drifts), _weighed(turn, drifts)
     likely = None if roll_stays else loss
     proven = None if seen.is_free else step_test.proven(likely, turn, params.alarms_per_month)
     mixed = _mixed(state, found.ways, _jumped(params.flow))
-    after = _opened(_learnt(state, mixed, found, passage, across, bank, dive.end), proven)
+    after = _learnt(state, mixed, found, passage, across, bank, dive.end)
+    after = replace(after, way=readonly(own * seen.heading), drifts=drifts)
+    after = _opened(after, proven)
     return after, JointInfo(
         seen=seen,
         estimate=_estimate(after, seen, params, slipping),
@@ -268,6 +276,24 @@ def step(
     )
 
 
+def _drifted(state: JointState, start: Fix, params: JointParams) -> Drifts:
+    """The drifts at the surface with the one before a dive that begins with a fix."""
+    found = surface_drift.drift(state.end, start)
+    if found is None or state.end is None or not state.dives:
+        return state.drifts
+    flow, _ = expected_flow(state, params.flow, np.zeros(2), state.end.t, start.t)
+    return surface_drift.added(state.drifts, start.t, found - flow, state.way)
+
+
+def _weighed(step: Step | None, drifts: Drifts) -> Step | None:
+    """A step with what the drifts at the surface say for or against it in its ratio."""
+    if step is None:
+        return None
+    slip, side = step.sizes[:2].tolist()
+    said = surface_drift.evidence(drifts, step.begun, slip, side)
+    return replace(step, ratio=max(step.ratio + said, 0.0))
+
+
 def _explained(state: JointState, measured: Measured, params: JointParams, hint: Mode | None) -> Explanations:
     """A dive in all modes; ``hint``: also in this one."""
     jumped, shown = _jumped(params.flow)[-SHOWN:, -SHOWN:], state.cov[-SHOWN:, -SHOWN:]
@@ -276,16 +302,16 @@ def _explained(state: JointState, measured: Measured, params: JointParams, hint:
 
 
 def _tested(
-    state: JointState, found: Explanations, passage: Passage, params: JointParams
+    state: JointState, found: Explanations, passage: Passage, start: float, params: JointParams
 ) -> tuple[Step | None, Step | None, Bank]:
-    """The likeliest loss and turn, and the bank with one more dive.
+    """The likeliest loss and turn, and the bank with one more dive, begun at a time (s).
 
     Another flow may be what a step looks like, so that such a dive is tested as a usual one.
     """
     way = found.usual if found.usual is not None and found.best.cause is Cause.FLOW else found.best
-    steps = _jump(params.flow)
-    update = _update(state, way, _jumped(params.flow))
-    return step_test.steps(state.bank, passage_matrix(passage), update, steps, params.front, state.dives)
+    update, matrix = _update(state, way, _jumped(params.flow)), passage_matrix(passage)
+    jump, dives = _jump(params.flow), state.dives
+    return step_test.steps(state.bank, matrix, update, jump, params.front, start, dives)
 
 
 @lru_cache(maxsize=64)  # a dive comes again when its current is corrected
@@ -458,7 +484,8 @@ def _opened(state: JointState, proven: Step | None) -> JointState:
         return state
     shift = proven.shift
     cov = state.cov + proven.cov + np.outer(shift, shift) / 4
-    return replace(state, x=readonly(_bounded(state.x + shift)), cov=readonly(cov), bank=Bank())
+    x = readonly(_bounded(state.x + shift))
+    return replace(state, x=x, cov=readonly(cov), bank=Bank(), drifts=Drifts())
 
 
 def _estimate(state: JointState, seen: Observation, params: JointParams, slipping: Slipping) -> JointEstimate:

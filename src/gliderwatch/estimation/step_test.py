@@ -36,12 +36,14 @@ class Bank:
 
     ``shift`` ((k, n, q)): by how much the state differs from what the filter makes of it, for each of the q
     numbers that describe a step; ``info`` ((k, q, q)) and ``score`` ((k, q)): information about these
-    numbers in the innovations since, and the gradient of the log likelihood in them.
+    numbers in the innovations since, and the gradient of the log likelihood in them; ``begun`` (s, (k,)) when
+    each step would have been.
     """
 
     shift: Array = field(default_factory=lambda: readonly(np.empty((0, 0, 0))))
     info: Array = field(default_factory=lambda: readonly(np.empty((0, 0, 0))))
     score: Array = field(default_factory=lambda: readonly(np.empty((0, 0))))
+    begun: Array = field(default_factory=lambda: readonly([]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +66,7 @@ class Step:
 
     ``ratio`` is twice the log likelihood ratio: where there was no step, of chi-square with one degree of
     freedom at each dive. ``which`` number and ``sigma`` of the step; ``shifts``, ``info`` and ``score``: the
-    hypothesis, as in the `Bank`.
+    hypothesis, as in the `Bank`; ``begun`` (s) when it would have been.
     """
 
     ratio: float
@@ -73,16 +75,22 @@ class Step:
     shifts: Array
     info: Array
     score: Array
+    begun: float
+
+    @property
+    def sizes(self) -> Array:
+        """The numbers that describe the step, (q,): slip and side first."""
+        return np.asarray(np.linalg.solve(self.info, self.score))
 
     @property
     def size(self) -> float:
         """Size of the step."""
-        return float(np.linalg.solve(self.info, self.score)[self.which])
+        return float(self.sizes[self.which])
 
     @property
     def shift(self) -> Array:
         """By how much the state is off by all of it, (n,)."""
-        return np.asarray(self.shifts @ np.linalg.solve(self.info, self.score))
+        return np.asarray(self.shifts @ self.sizes)
 
     @property
     def cov(self) -> Array:
@@ -91,8 +99,16 @@ class Step:
         return np.asarray((shifted + shifted.T) / 2)
 
 
-def advance(bank: Bank, shape: Array, precision: Array, kept: Array, update: Update, dives: int = 1) -> Bank:
-    """The bank after one more dive, the one after ``dives`` before it.
+def advance(
+    bank: Bank,
+    shape: Array,
+    precision: Array,
+    kept: Array,
+    update: Update,
+    begun: float,
+    dives: int = 1,
+) -> Bank:
+    """The bank after one more dive, ``begun`` at a time (s), the one after ``dives`` before it.
 
     ``shape`` ((n, q)) is what a step does to the state, ``precision`` ((q, q)) what is known of its size
     before, ``kept`` ((n, n)) the transition to the dive.
@@ -108,6 +124,7 @@ def advance(bank: Bank, shape: Array, precision: Array, kept: Array, update: Upd
         readonly(shift - update.gain @ seen),
         readonly(info + weighted @ seen),
         readonly(score + weighted @ update.innovation),
+        readonly([*bank.begun[held], begun]),
     )
 
 
@@ -143,6 +160,7 @@ def likeliest(bank: Bank, which: int, sign: int = 0) -> Step | None:
         shifts=bank.shift[k],
         info=bank.info[k],
         score=bank.score[k],
+        begun=float(bank.begun[k]),
     )
 
 
@@ -204,12 +222,12 @@ def cusum_bound(slack: float, dives_between_alarms: float) -> float:
 
 
 def steps(
-    bank: Bank, matrix: Array, update: Update, jump: Array, front: float, dives: int
+    bank: Bank, matrix: Array, update: Update, jump: Array, front: float, begun: float, dives: int
 ) -> tuple[Step | None, Step | None, Bank]:
     """The likeliest loss (a step up in slip) and turn (one in side), and the bank with one more dive.
 
-    ``matrix`` ((n, n)) is the transition to the dive, after ``dives`` before, and ``update`` that of the
-    filter. The flow may have
+    ``matrix`` ((n, n)) is the transition to the dive, ``begun`` at a time (s) after ``dives`` before, and
+    ``update`` that of the filter. The flow may have
     changed together with the step, by ``front`` (m/s, a component), which does ``jump`` ((n, 2)) to the
     state. No dive alone may prove a step.
     """
@@ -219,7 +237,8 @@ def steps(
     sizes = np.array([STEP_SIZE, STEP_SIZE, front, front])
     square = float(update.innovation @ update.weight @ update.innovation)
     believed = update.innovation * min(1.0, LONGEST_INNOVATION / math.sqrt(max(square, 1e-12)))
-    bank = advance(bank, shape, np.diag(sizes**-2), matrix, replace(update, innovation=believed), dives)
+    update = replace(update, innovation=believed)
+    bank = advance(bank, shape, np.diag(sizes**-2), matrix, update, begun, dives)
     return likeliest(bank, 0, sign=1), likeliest(bank, 1), bank
 
 

@@ -141,7 +141,7 @@ def foreseen_by_one_sea(state: Any) -> Any:
 
 def driven_dives(state: Any) -> Any:
     """Layout 7 to 8: healthy dives have the volumes pumped, not known of those that were; what lasts and what
-    was slow is called so."""
+    was slow is called so; a step that was thought of is taken for one of now, as no drift was kept."""
     for memory in (state.get("settled", {}), state.get("memory", {})):
         estimate = memory.get("estimate", {})
         for part in (estimate.get("speed", {}), estimate.get("learner", {})):
@@ -151,8 +151,11 @@ def driven_dives(state: Any) -> Any:
         speed = estimate.get("speed", {})
         if "doubted" in speed:
             speed["was_slow"] = bool(speed.pop("doubted"))
-        if "wrong" in (speed.get("filter") or {}):
-            moved(speed["filter"], "wrong", "lasting")
+        if (kept := speed.get("filter")) is not None:
+            if "wrong" in kept:
+                moved(kept, "wrong", "lasting")
+            if (bank := kept.get("bank", {})).get("score"):
+                bank["begun"] = _written(np.full(len(_array(bank["score"])), float(kept["t"])))
     return state
 
 
