@@ -83,6 +83,25 @@ class TestIncidents:
         (found,) = World({one.t_dive: one for one in made}).incidents()
         assert (found.cleared_at is not None) == cleared
 
+    @pytest.mark.parametrize(
+        ("was", "now", "sigma", "cleared"),
+        [
+            (0.2, 0.11, 0.02, False),
+            (0.2, 0.09, 0.02, True),
+            (0.2, 0.11, 0.06, True),
+            (0.14, 0.13, 0.02, True),
+        ],
+    )
+    def test_a_compass_is_off_until_half_of_that_is_gone(self, was, now, sigma, cleared):
+        """One of 0.18 rad, and three standard errors of as much, was told and taken back by turns."""
+        calm = {"across_misfit": 0.0, "across_sigma": 0.01}
+        before = {**DISAGREE.evidence, **calm, "side": -was}
+        after = {**DISAGREE.evidence, **calm, "side": -now, "side_sigma": sigma}
+        made = [dive(k, "2", evidence=before) for k in range(3)]
+        made += [dive(k, "0", evidence=after) for k in range(3, 8)]
+        (found,) = World({one.t_dive: one for one in made}).incidents()
+        assert (found.cleared_at is not None) == cleared
+
     @pytest.mark.parametrize("slower, holds", [(0.04, True), (0.055, False)])
     def test_an_anomaly_has_grown_worse_by_5_cm_s(self, slower, holds):
         ack = acknowledge(incident(replace(SLOW, speed=0.19, speed_min=0.2)), "ann", "", T0)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from math import inf
 
+from gliderwatch.estimation.constants import COMPASS_OFF
 from gliderwatch.incidents.constants import LINGERS, SEVERE, SURELY, WELL
 from gliderwatch.model import Assessment, Flag, Incident, Kind
 from gliderwatch.params import AnomalyRule, FalseAlarmRule, RuleParams
@@ -111,12 +112,15 @@ def _says_of_anomaly(dive: Assessment, is_open: bool) -> bool | None:
 
 def _says_of_disagreement(dive: Assessment, opened: Incident | None) -> bool | None:
     """Whether a dive is flagged (None: it says neither). What was ``opened`` is over when what is across the
-    heading is no longer half of what it was: a misfit at the bound is not mended by being just below."""
+    heading, or what the compass is off, is no longer half of what it was: a misfit at the bound is not mended
+    by being just below."""
     if dive.flag != Flag.NORMAL or opened is None:
         return dive.flag == Flag.FALSE_ALARM
-    was, now = (abs(each.evidence.get("across_misfit", 0.0)) for each in (opened.last, dive))
-    sigma = dive.evidence.get("across_sigma", inf)
-    return None if now > max(LINGERS * was, SURELY * sigma) else False
+    for misfit, error, least in (("across_misfit", "across_sigma", 0.0), ("side", "side_sigma", COMPASS_OFF)):
+        was, now = (abs(each.evidence.get(misfit, 0.0)) for each in (opened.last, dive))
+        if was > least and now > max(LINGERS * was, SURELY * dive.evidence.get(error, inf)):
+            return None
+    return False
 
 
 def is_severe(dive: Assessment) -> bool:
