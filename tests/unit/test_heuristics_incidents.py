@@ -102,6 +102,16 @@ class TestIncidents:
         (found,) = World({one.t_dive: one for one in made}).incidents()
         assert (found.cleared_at is not None) == cleared
 
+    @pytest.mark.parametrize(("letter", "why"), [("1", "were near the usual speed"), ("2", "agreed")])
+    @pytest.mark.parametrize(("normal", "is_back"), [(4, True), (22, True), (30, False)])
+    def test_what_is_back_within_three_days_is_called_that(self, letter, why, normal, is_back):
+        talk, letters = Announcer(), letter * 4 + "0" * normal + letter * 4
+        for k in range(1, len(letters) + 1):
+            talk.update(letters[:k])
+        first, second = (a for a in talk.alerts if a.kind in (Kind.ANOMALY, Kind.FALSE_ALARM))
+        assert "is back" not in first.body
+        assert ("is back: dives until 1970-01-0" in second.body and why in second.body) == is_back
+
     @pytest.mark.parametrize("slower, holds", [(0.04, True), (0.055, False)])
     def test_an_anomaly_has_grown_worse_by_5_cm_s(self, slower, holds):
         ack = acknowledge(incident(replace(SLOW, speed=0.19, speed_min=0.2)), "ann", "", T0)

@@ -94,6 +94,9 @@ LINGERS = 0.5
 """and by which, and by this part of what it was, a misfit across the heading has to be there for
 measurements still to disagree."""
 
+BACK = 3 * 86400.0
+"""s after the end of an incident within which another of its kind is called the same one again."""
+
 # Reminders of what is open
 MARKS = (1.0, 2.0, 4.0, 7.0)
 """Days after which people are reminded of an open incident,"""

@@ -54,12 +54,14 @@ NOTHING_ELSE = Situation()
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """An incident opened at the surfacing of a dive; it takes the place of the one reported ``before``."""
+    """An incident opened at the surfacing of a dive; it takes the place of the one reported ``before``, or is
+    that of its kind ``again`` whose end was reported not long ago."""
 
     incident: Incident
     dive: Assessment
     situation: Situation = NOTHING_ELSE
     before: Incident | None = None
+    again: Incident | None = None
 
 
 @dataclass(frozen=True, slots=True)

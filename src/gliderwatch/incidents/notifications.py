@@ -11,7 +11,7 @@ from gliderwatch.fleet.advice import Advice
 from gliderwatch.incidents.aborts import Episode
 from gliderwatch.incidents.acknowledgement import Acks
 from gliderwatch.incidents.calls import CallsWithoutFile
-from gliderwatch.incidents.constants import FLOW_CHANGE, NEWS, REGIME_DIVES, SETTLES, SPEED_CHANGE
+from gliderwatch.incidents.constants import BACK, FLOW_CHANGE, NEWS, REGIME_DIVES, SETTLES, SPEED_CHANGE
 from gliderwatch.incidents.facts import Facts, last_dives, next_surfacing, situation
 from gliderwatch.incidents.health import HealthThread
 from gliderwatch.incidents.neighbours import Comparison
@@ -182,10 +182,19 @@ def _of_incidents(
         notices += more
     for incident in over if opened is None else [opened]:
         thread = Thread(thread_id(incident.id, {t.id for t in threads}), incident, incident.last, 0, 0.0)
-        after, more = _opened(thread, incident, [] if opened is None else over, moment)
+        after, more = _opened(
+            thread, incident, [] if opened is None else over, moment, _again(before, incident)
+        )
         threads.append(after)
         notices += more
     return tuple(threads), notices, min(settles, default=None)
+
+
+def _again(threads: Iterable[Thread], incident: Incident) -> Incident | None:
+    """The incident of the same kind whose end people were notified of within `BACK` before this one."""
+    over = [t.reported for t in threads if t.reported.kind is incident.kind and not t.withdrawn]
+    ended = [i for i in over if i.cleared_at is not None and 0 <= incident.opened_at - i.cleared_at < BACK]
+    return max(ended, key=lambda i: i.cleared_at or 0.0, default=None)
 
 
 def _unreported(
@@ -297,15 +306,19 @@ def _is_news(incident: Incident, latest: Assessment) -> bool:
 
 
 def _opened(
-    thread: Thread, incident: Incident, former: Sequence[Incident], moment: _Moment
+    thread: Thread,
+    incident: Incident,
+    former: Sequence[Incident],
+    moment: _Moment,
+    again: Incident | None = None,
 ) -> tuple[Thread, list[Notice]]:
     """A thread with the first message of an incident: of one that is over already that is its end.
 
     It takes the place of the ``former`` ones, which are over or gone without a message of that: one message
-    says what is so now.
+    says what is so now. ``again``: one that people take for over.
     """
     content: Opened | Cleared = Opened(
-        incident, incident.last, situation(moment.facts, incident.id), former[-1] if former else None
+        incident, incident.last, situation(moment.facts, incident.id), former[-1] if former else None, again
     )
     if incident.cleared_at is not None:
         content = _cleared(incident, moment, is_first=True)

@@ -54,9 +54,10 @@ def opened(glider: str, content: Opened) -> Text:
     incident, dive, now = content.incident, content.dive, content.situation
     likely = likeliest(incident.kind, dive)
     is_disagreement = incident.kind is Kind.FALSE_ALARM
+    earlier = _instead(incident, content.before) or _again(content.again)
     page = Page(
         (
-            f"{_headline(incident, dive, likely)}{_instead(incident, content.before)}",
+            f"{_headline(incident, dive, likely)}{earlier}",
             where(dive, is_flow_sure=not is_disagreement),
             next_call(now.expected),
         ),
@@ -80,6 +81,14 @@ def _instead(incident: Incident, before: Incident | None) -> str:
     if incident.kind is Kind.FALSE_ALARM:
         return f"{reported} is now more likely a wrong measurement, because {_dives(incident)} contradict it."
     return f"{reported} is now more likely this, because its speed explains both."
+
+
+def _again(over: Incident | None) -> str:
+    """What people were told is over and is back, and why it was called over."""
+    if over is None or over.cleared_at is None:
+        return ""
+    why = "agreed" if over.kind is Kind.FALSE_ALARM else "were near the usual speed"
+    return f" The {_name(over)} since {utc(over.since)} is back: dives until {utc(over.cleared_at)} {why}."
 
 
 def still_open(glider: str, content: StillOpen) -> Text:
