@@ -45,11 +45,12 @@ class _Begun:
             self._processes = [*(one for one in self._processes if one.is_alive()), process]
 
     def end(self) -> None:
-        """Kill all of them."""
+        """Kill all of them, and forget them: one that is remembered keeps two pipes open."""
         with self._lock:
             self._ended = True
             for process in self._processes:
                 process.kill()
+            self._processes = []
 
 
 class _Process(SpawnProcess):

@@ -1,9 +1,12 @@
 """Processes that work for the daemon: how they are begun and ended."""
 
+import gc
 import multiprocessing
 import os
 import signal
 import time
+from contextlib import suppress
+from pathlib import Path
 
 import pytest
 
@@ -40,6 +43,33 @@ def test_processes_end_before_what_they_speak_through_also_while_they_are_born(s
     time.sleep(seconds)
     pool.end()
     assert pool.alive == []
+
+
+def test_they_leave_no_pipe_open():
+    """At once, not when the garbage is collected: a service that is watched for leaks counts them."""
+
+    def begun_and_ended() -> int:
+        pool = Watched()
+        assert pool.schedule(os.getpid).result(timeout=60.0)
+        pool.end()
+        del pool
+        return pipes()
+
+    begun_and_ended()  # what multiprocessing itself keeps
+    gc.collect()
+    gc.disable()
+    try:
+        assert begun_and_ended() == begun_and_ended()
+    finally:
+        gc.enable()
+
+
+def pipes() -> int:
+    found = 0
+    for fd in Path("/proc/self/fd").iterdir():
+        with suppress(FileNotFoundError):  # the one that the folder is read by
+            found += str(fd.readlink()).startswith("pipe:")
+    return found
 
 
 def test_none_is_begun_once_they_have_ended():
