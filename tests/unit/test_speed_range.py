@@ -105,6 +105,12 @@ def test_at_a_new_setting_more_volume_makes_more_expected():
     assert found.usual == pytest.approx(math.sqrt(408 / 250 * 0.297**2 + 0.4 * 0.14))
 
 
+@pytest.mark.parametrize(("before", "times"), [(-210e-6, 400 / 210), (-190e-6, 2.0), (-50e-6, 2.0)])
+def test_at_most_twice_the_volume_is_counted_on(before, times):
+    found = speed_range(learnt([0.25] * 3, volumes=(before, 0.0)), Drive(0.14, (-400e-6, 0.0)), PARAMS)
+    assert found.usual == pytest.approx(math.sqrt(times * 0.25**2 + 0.4 * 0.14))
+
+
 @pytest.mark.parametrize(
     ("before", "now"),
     [

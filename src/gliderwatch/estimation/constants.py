@@ -258,6 +258,9 @@ NEAR = 0.05
 LEAST_THRUST = 0.4
 """m2/s2: of `THRUST` what is counted on at a setting that was never flown. Half of it, as a range that is too
 high is a false alarm, and one that is too low is not noticed: between 0.3 and 0.55 the same is told."""
+MOST_PUMPED = 2.0
+"""How many times the volume of an earlier dive is counted on there at most: of a dive on which far less was
+pumped it is not known why."""
 SHORTEST = 3600.0
 """s: a shorter dive teaches nothing: turns and surface take too much of it, and after launch pilots try out
 the ballast."""

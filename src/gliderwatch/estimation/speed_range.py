@@ -18,6 +18,7 @@ from gliderwatch.estimation.constants import (
     FASTEST,
     LEAST_THRUST,
     MAD_TO_SIGMA,
+    MOST_PUMPED,
     NARROWEST,
     NEAR,
     RANGE_LEAST,
@@ -140,7 +141,7 @@ def _driven(normal: Normal, which: NDArray[np.bool_], at: Drive) -> Array:
     both = np.array(at.volumes) * volumes > 0  # known, and of one sign
     times = np.divide(at.volumes, volumes, out=np.zeros_like(volumes), where=both)
     known = both.sum(axis=1)
-    pumped = np.where(known > 0, times.sum(axis=1) / np.maximum(known, 1), 1.0)
+    pumped = np.where(known > 0, np.minimum(times.sum(axis=1) / np.maximum(known, 1), MOST_PUMPED), 1.0)
     more = LEAST_THRUST * (at.setting - normal.settings[which])
     return np.sqrt(pumped * normal.speeds[which] ** 2 + more)
 
