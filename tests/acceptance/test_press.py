@@ -66,12 +66,21 @@ def text_of(driver: Any) -> str:
 
 def pressed(driver: Any, words: str) -> str:
     """What the next page says after the button of some words was pressed."""
+    from selenium.common.exceptions import WebDriverException
     from selenium.webdriver.support.expected_conditions import staleness_of
+
+    def is_left() -> bool:
+        try:
+            return bool(staleness_of(button)(driver))
+        except WebDriverException as error:  # Chromium's word for it while the page changes
+            if "does not belong to the document" in str(error):
+                return True
+            raise
 
     button = next((b for b in driver.find_elements("tag name", "button") if words in b.text), None)
     assert button is not None, f"no button {words}: {text_of(driver)}"
     button.click()
-    until(lambda: staleness_of(button)(driver), "the page of the button is left")
+    until(is_left, "the page of the button is left")
     return text_of(driver)
 
 
