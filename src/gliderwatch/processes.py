@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable, Sequence
 from multiprocessing.context import SpawnContext, SpawnProcess
 from threading import Lock
@@ -19,13 +20,20 @@ class Workers(ProcessPool):
     def __init__(self, most: int, initializer: Callable[..., None], initargs: Sequence[object] = ()) -> None:
         self._begun = _Begun()
         context: Any = _Context(self._begun)
-        super().__init__(max_workers=most, initializer=initializer, initargs=initargs, context=context)
+        super().__init__(most, initializer=_born, initargs=(initializer, *initargs), context=context)
 
     def end(self) -> None:
         """End all of them at once, whatever they do. No job may be given to them any more."""
         self.stop()  # type: ignore[no-untyped-call]
         self._begun.end()
         self.join()
+
+
+def _born(initializer: Callable[..., None], *arguments: object) -> None:
+    """What each process does first. Pebble has it ignore what is typed at a terminal, and end in its own way
+    when it is told to; it is to die at once, also inside foreign code."""
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    initializer(*arguments)
 
 
 class _Begun:

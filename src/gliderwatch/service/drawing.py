@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
@@ -57,9 +56,7 @@ class DrawingProcess:
 
 
 def _prepare(cache: str, niceness: int, warm: Callable[[], None] | None) -> None:
-    """What the process does first: it yields to others, and dies at once when it is told to."""
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """What the process does first: it yields to others."""
     with suppress(OSError):  # systemd's filter may refuse it
         os.nice(niceness)
     os.environ.setdefault("MPLCONFIGDIR", cache)

@@ -135,9 +135,7 @@ def why_not(error: BaseException) -> GliderwatchError:
 
 
 def _prepare() -> None:
-    """What a worker does first: it dies at once when it is told to."""
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """What a worker does first: nothing here gains from threads of linear algebra."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 

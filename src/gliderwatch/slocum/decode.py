@@ -395,7 +395,6 @@ class Decoder:
 
 def _prepare(scratch: str, memory: int) -> None:
     """What a worker does before its first task."""
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # to die at once, also inside foreign code
     tempfile.tempdir = scratch
     for kind, limit in ((resource.RLIMIT_AS, memory), (resource.RLIMIT_CORE, 0)):
         hard = resource.getrlimit(kind)[1]
