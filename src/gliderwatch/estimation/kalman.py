@@ -237,9 +237,9 @@ def step(
     seen = observe(dive)
     if state is None:
         state = init(params, seen.start)
-    drifts = _drifted(state, dive.start, params)
     passage = _passage(state, seen.start, seen.end, dive.start.lat, params)
-    state = _predicted(state, seen.end, tuple(seen.ground.tolist()), passage, params)
+    expected = _predicted(state, seen.end, tuple(seen.ground.tolist()), passage, params)
+    state = replace(expected, drifts=_drifted(state, dive.start, params))
     believed = seen.own_speed()
     if believed is not None:
         own = believed[0]
@@ -253,13 +253,11 @@ def step(
     loss, turn, bank = _tested(state, found, passage, seen.start, params)
     # a loss that the glider does not know of is that of a wing: where the roll stays it is the sea's; and
     # where no heading was measured, what looks like a step is a turn that was not seen
-    loss, turn = _weighed(loss, drifts), _weighed(turn, drifts)
     likely = None if roll_stays else loss
     proven = None if seen.is_free else step_test.proven(likely, turn, params.alarms_per_month)
     mixed = _mixed(state, found.ways, _jumped(params.flow))
-    after = _learnt(state, mixed, found, passage, across, bank, dive.end)
-    after = replace(after, way=readonly(own * seen.heading), drifts=drifts)
-    after = _opened(after, proven)
+    way = readonly(own * seen.heading)
+    after = _opened(_learnt(state, mixed, found, passage, across, bank, way, dive.end), proven)
     return after, JointInfo(
         seen=seen,
         estimate=_estimate(after, seen, params, slipping),
@@ -276,6 +274,7 @@ def step(
     )
 
 
+@lru_cache(maxsize=64)  # a dive comes again when its current is corrected
 def _drifted(state: JointState, start: Fix, params: JointParams) -> Drifts:
     """The drifts at the surface with the one before a dive that begins with a fix."""
     found = surface_drift.drift(state.end, start)
@@ -304,14 +303,16 @@ def _explained(state: JointState, measured: Measured, params: JointParams, hint:
 def _tested(
     state: JointState, found: Explanations, passage: Passage, start: float, params: JointParams
 ) -> tuple[Step | None, Step | None, Bank]:
-    """The likeliest loss and turn, and the bank with one more dive, begun at a time (s).
+    """The likeliest loss and turn, as the drifts at the surface have them too, and the bank with one more
+    dive, begun at a time (s).
 
     Another flow may be what a step looks like, so that such a dive is tested as a usual one.
     """
     way = found.usual if found.usual is not None and found.best.cause is Cause.FLOW else found.best
     update, matrix = _update(state, way, _jumped(params.flow)), passage_matrix(passage)
     jump, dives = _jump(params.flow), state.dives
-    return step_test.steps(state.bank, matrix, update, jump, params.front, start, dives)
+    loss, turn, bank = step_test.steps(state.bank, matrix, update, jump, params.front, start, dives)
+    return _weighed(loss, state.drifts), _weighed(turn, state.drifts), bank
 
 
 @lru_cache(maxsize=64)  # a dive comes again when its current is corrected
@@ -435,6 +436,7 @@ def _learnt(
     passage: Passage,
     across: tuple[float, float] | None,
     bank: Bank,
+    way: Array,
     end: Fix | None,
 ) -> JointState:
     """The state of which ``mixed`` is the mixture, with what a dive adds to the noise learnt in ``state`` and
@@ -452,6 +454,8 @@ def _learnt(
         bank=bank,
         end=end,
         lasting={each: found.odds[str(each)] for each in Cause if each.lasts and str(each) in found.odds},
+        way=way,
+        drifts=state.drifts,
     )
 
 

@@ -99,7 +99,7 @@ def learn(
     every = max(round(params.spacing / max(duration, 1.0)), 1)
     if is_trial or similar >= params.most or (similar >= params.least and before % every):
         return normal
-    return _with(normal, np.ones(len(normal.speeds), bool), (speed,), at)
+    return _with(normal, slice(None), (speed,), at)
 
 
 def renewed(normal: Normal, speeds: tuple[float, ...], at: Drive) -> Normal:
@@ -107,7 +107,7 @@ def renewed(normal: Normal, speeds: tuple[float, ...], at: Drive) -> Normal:
     return _with(normal, ~_alike(normal, at), speeds, at)
 
 
-def _with(normal: Normal, kept: NDArray[np.bool_], speeds: tuple[float, ...], at: Drive) -> Normal:
+def _with(normal: Normal, kept: NDArray[np.bool_] | slice, speeds: tuple[float, ...], at: Drive) -> Normal:
     """Those of the dives that are ``kept``, and more at some speeds, all driven so."""
     return Normal(
         readonly([*normal.speeds[kept], *speeds]),

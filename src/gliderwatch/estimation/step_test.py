@@ -227,9 +227,8 @@ def steps(
     """The likeliest loss (a step up in slip) and turn (one in side), and the bank with one more dive.
 
     ``matrix`` ((n, n)) is the transition to the dive, ``begun`` at a time (s) after ``dives`` before, and
-    ``update`` that of the filter. The flow may have
-    changed together with the step, by ``front`` (m/s, a component), which does ``jump`` ((n, 2)) to the
-    state. No dive alone may prove a step.
+    ``update`` that of the filter. The flow may have changed together with the step, by ``front`` (m/s, a
+    component), which does ``jump`` ((n, 2)) to the state. No dive alone may prove a step.
     """
     shape = np.zeros((len(matrix), 4))
     shape[[SLIP, SIDE], [0, 1]] = 1.0

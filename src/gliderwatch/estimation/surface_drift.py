@@ -30,7 +30,7 @@ from gliderwatch.estimation.constants import (
     SURFACE_FLOW,
 )
 from gliderwatch.model import Array, Fix, readonly
-from gliderwatch.navigation.geodesy import displacement
+from gliderwatch.navigation.geodesy import velocity
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +51,7 @@ def drift(before: Fix | None, after: Fix) -> Array | None:
     are not of one surfacing, or too near, or one of them is wild."""
     if before is None or not DRIFT_SHORTEST <= after.t - before.t <= DRIFT_LONGEST:
         return None
-    found = displacement(after.lat, after.lon, before.lat, before.lon) / (after.t - before.t)
+    found = velocity(before, after)
     return found if np.hypot(*found) < CARRIED else None
 
 

@@ -24,7 +24,7 @@ from gliderwatch.forecast.surfacing import (
 )
 from gliderwatch.model import Array, Dive, Fix, NextSurfacing
 from gliderwatch.navigation.constants import SHORTEST_DIVE
-from gliderwatch.navigation.geodesy import displacement
+from gliderwatch.navigation.geodesy import velocity
 from gliderwatch.sea.gauss_markov import FlowParams
 
 Outlook = tuple[float, float, Flow]
@@ -62,8 +62,7 @@ def after_call(
     """
     if before.fix is None or fix.t - before.fix.t < SHORTEST_DIVE or are_apart(before.fix, fix):
         return None
-    moved = displacement(fix.lat, fix.lon, before.fix.lat, before.fix.lon)
-    outlook = look_ahead(estimate, moved / (fix.t - before.fix.t))
+    outlook = look_ahead(estimate, velocity(before.fix, fix))
     return None if outlook is None else expect(called(before, fix, waypoint), *outlook, hours)
 
 

@@ -47,7 +47,7 @@ from gliderwatch.forecast.steering import UNSENT, WAYS, Leg, Plan, courses
 from gliderwatch.forecast.timing import quantile
 from gliderwatch.model import Array, Dive, Fix, NextSurfacing, Segment, Track, Unusable, readonly
 from gliderwatch.navigation.flight import joined
-from gliderwatch.navigation.geodesy import displacement, from_plane, to_plane
+from gliderwatch.navigation.geodesy import displacement, from_plane, to_plane, velocity
 
 # ----------------------------------------
 # What is remembered of past surfacings, and what follows from it for the way ahead.
@@ -241,8 +241,7 @@ def ground(dive: Dive) -> Array | None:
     """Velocity over ground (m/s, (2,)) between the fixes of a dive; None where one is not known or stale."""
     if dive.start is None or dive.end is None or _is_stale(dive):
         return None
-    moved = displacement(dive.end.lat, dive.end.lon, dive.start.lat, dive.start.lon)
-    return np.asarray(moved / max(dive.end.t - dive.start.t, 1.0))
+    return velocity(dive.start, dive.end)
 
 
 def called(state: Surfacings, fix: Fix, waypoint: Place | None) -> Surfacings:
@@ -321,13 +320,12 @@ def _drift(state: Surfacings, dive: Dive) -> Vector:
     before = state.fix
     if before is None or dive.start is None or state.current is None or _is_stale(dive):
         return state.drift
-    time = dive.start.t - before.t
-    if time < LONG_DRIFT or is_unseen(dive):
+    if dive.start.t - before.t < LONG_DRIFT or is_unseen(dive):
         return state.drift
-    moved = displacement(dive.start.lat, dive.start.lon, before.lat, before.lon)
+    drift = velocity(before, dive.start).tolist()
     east, north = (
-        (1 - DRIFT_GAIN) * old + DRIFT_GAIN * min(max(way / time - flow, -FASTEST_DRIFT), FASTEST_DRIFT)
-        for old, way, flow in zip(state.drift, moved.tolist(), state.current, strict=True)
+        (1 - DRIFT_GAIN) * old + DRIFT_GAIN * min(max(new - flow, -FASTEST_DRIFT), FASTEST_DRIFT)
+        for old, new, flow in zip(state.drift, drift, state.current, strict=True)
     )  # the current is that of the dive before
     return east, north
 

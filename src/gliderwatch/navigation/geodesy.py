@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gliderwatch.model import Array, readonly
+from gliderwatch.model import Array, Fix, readonly
 
 _SEMI_MAJOR = 6378137.0
 _ECCENTRICITY2 = 6.69437999014e-3
@@ -56,6 +56,12 @@ def displacement(lat: float, lon: float, lat0: float, lon0: float) -> Array:
     meridian, parallel = _radii_of_point((lat + lat0) / 2)
     dlon = (lon - lon0 + 180.0) % 360.0 - 180.0
     return readonly([parallel * math.radians(dlon), meridian * math.radians(lat - lat0)])
+
+
+def velocity(start: Fix, end: Fix) -> Array:
+    """Mean velocity over ground (m/s, (2,): east, north) from one fix to another, at least 1 s later."""
+    moved = displacement(end.lat, end.lon, start.lat, start.lon)
+    return np.asarray(moved / max(end.t - start.t, 1.0))
 
 
 def from_plane(x: Sequence[float] | Array, lat0: float, lon0: float) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from functools import cache, lru_cache
 import numpy as np
 
 from gliderwatch.model import Array, Fix, readonly
-from gliderwatch.navigation.geodesy import displacement
+from gliderwatch.navigation.geodesy import velocity
 from gliderwatch.sea.constants import (
     APART,
     EVEN,
@@ -219,7 +219,7 @@ def _foreseen(sea: Sea, gap: float, lasts: float, start: Fix, end: Fix) -> _Fore
     parts, _ = rotary_passage(gap, lasts, _rates(start.lat), _intensities(mean))
     matrix, noise = parts[:, 0, :, :-1], parts[:, 1]
     cov = matrix @ cov @ matrix.conj().transpose(0, 2, 1) + noise
-    ground = displacement(end.lat, end.lon, start.lat, start.lon) / max(end.t - start.t, 1.0)
+    ground = velocity(start, end)
     steps = np.zeros(PARAMS.parts + 1)
     steps[[0, -1]] = 1.0
     flows = mean[:, 0] + mean[:, 1]
