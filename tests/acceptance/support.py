@@ -118,7 +118,7 @@ class Mail:
     accepted: float
 
 
-@dataclass(slots=True)
+@dataclass  # no slots: those of Python 3.11.2, which is Debian 12's, are not to be looked at as aiosmtpd does
 class Mailbox:
     """The handler of a mail server: keeps what it accepts. While ``refusing``, it accepts nothing."""
 

@@ -231,7 +231,6 @@ def test_logs_that_grow_and_a_kill_in_the_midst_of_them_end_as_a_replay_does(tmp
 class Cutting(Mailbox):
     """A mail server that does something at the moment it takes the first mail, before it says so."""
 
-    __slots__ = ("moment",)
     moment: Callable[[], None] | None
 
     async def handle_DATA(self, server: Any, session: Any, envelope: Any) -> str:  # noqa: N802 (aiosmtpd)
