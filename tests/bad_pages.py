@@ -24,6 +24,16 @@ def misbehave(job: PageJob) -> None:
     put(job.folder / (job.glider or "all"), "whole")
 
 
+def sign(job: PageJob) -> None:
+    """Writes a file of the glider's name: which process it was."""
+    put(job.folder / (job.glider or "all"), str(os.getpid()))
+
+
+def process_of(_job: object) -> int:
+    """Which process it is."""
+    return os.getpid()
+
+
 def write_for_ever(path: Path) -> None:
     """Writes one page after the other, each of one letter."""
     k = 0

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.context import SpawnContext, SpawnProcess
 from threading import Lock
 from typing import Any
 
 from pebble import ProcessPool
+
+NotBegun = BrokenProcessPool
+"""What a job ends with whose process had died before it began it: nothing speaks against the job."""
 
 
 class Workers(ProcessPool):

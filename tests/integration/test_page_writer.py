@@ -13,7 +13,7 @@ from queue import SimpleQueue
 
 import pytest
 
-from bad_pages import misbehave
+from bad_pages import misbehave, sign
 from gliderwatch.config import load
 from gliderwatch.service.page_writer import FLEET_EVERY, PageWriter
 
@@ -63,6 +63,24 @@ def test_what_hangs_dies_or_fails_holds_up_no_other_page(folder: Path) -> None:
     finally:
         writer.stop()
     print(f"longest turn of the daemon's thread: {1000 * slowest:.0f} ms")
+
+
+def test_what_was_given_to_a_process_that_had_died_is_written_by_the_next(folder: Path) -> None:
+    news: SimpleQueue[object] = SimpleQueue()
+    writer = PageWriter(news.put, sign)
+    writer.use(load(configured(folder)))
+    before = "nobody"
+    try:
+        for _ in range(8):
+            writer.changed("")
+            while not writer.is_idle:
+                writer.turn([], monotonic=0.0)
+                news.get(timeout=60)
+            assert (folder / "all").read_text() != before
+            before = (folder / "all").read_text()
+            os.kill(int(before), signal.SIGKILL)
+    finally:
+        writer.stop()
 
 
 def test_without_a_folder_no_process_is_made(tmp_path: Path) -> None:

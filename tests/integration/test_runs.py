@@ -13,11 +13,13 @@ import pytest
 from pebble import ProcessExpired
 
 from gliderwatch.config import load
+from gliderwatch.errors import NotAssessed, Retry
 from gliderwatch.model import Segment
+from gliderwatch.processes import NotBegun
 from gliderwatch.service import backlog as backlog_module
 from gliderwatch.service import intake as intake_module
 from gliderwatch.service.daemon import Daemon
-from gliderwatch.service.run import Run, processed_for_another
+from gliderwatch.service.run import Run, processed_for_another, why_not
 from gliderwatch.simulate.delivery import arrivals, write_cache
 from gliderwatch.simulate.glider import simulate
 from gliderwatch.simulate.scenario import Scenario
@@ -142,6 +144,12 @@ def test_a_worker_that_is_killed_costs_no_file(loop: Loop) -> None:
     loop.before = end_once
     assert loop.take_all() == one_by_one(loop)
     assert loop.runs[:17] == [16] + [1] * 16
+
+
+@pytest.mark.parametrize("end", [expired(9), NotBegun()], ids=["at work", "before it began"])
+def test_what_a_killed_process_had_to_assess_is_tried_again(end: Exception) -> None:
+    assert isinstance(why_not(end), Retry)
+    assert isinstance(why_not(expired(11)), NotAssessed)
 
 
 def test_of_a_run_one_file_that_cannot_be_processed_is_left_out_alone(loop: Loop) -> None:

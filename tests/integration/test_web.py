@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 import re
+import signal
 import stat
 import threading
 import time
@@ -19,6 +21,7 @@ import pytest
 from itsdangerous import URLSafeTimedSerializer
 from starlette.testclient import TestClient
 
+from bad_pages import process_of
 from gliderwatch.cli.manage import mute_glider
 from gliderwatch.cli.status import acknowledge_incident
 from gliderwatch.config import Config, load
@@ -30,7 +33,7 @@ from gliderwatch.model import Alert, Assessment, Incident, Kind, Segment, Segmen
 from gliderwatch.pipeline import GliderState, Outcome
 from gliderwatch.store.state_file import Store
 from gliderwatch.web import app, live
-from gliderwatch.web.live import LivePage, PageCache
+from gliderwatch.web.live import LiveJob, LivePage, PageCache, Shown
 from unit.test_pages import HOSTILE, NOW, dive, incident
 
 NAMES = ("bruce", "electa")
@@ -338,6 +341,24 @@ def test_nobody_waits_for_a_page_that_is_there() -> None:
             await cache.get("none")
 
     asyncio.run(asked())
+
+
+def test_a_page_asked_for_as_its_process_dies_is_made_by_the_next(tmp_path: Path) -> None:
+    draw = app.InProcess(tmp_path / "state.sqlite")
+    job = LiveJob(Shown(tmp_path / "state.sqlite", {}, {}, (), (), ""), "index.html")
+
+    async def asked() -> None:
+        before = await draw(process_of, job)
+        for _ in range(6):
+            os.kill(before, signal.SIGKILL)
+            after = await draw(process_of, job)
+            assert after != before
+            before = after
+
+    try:
+        asyncio.run(asked())
+    finally:
+        draw.stop()
 
 
 # --------------------------------------------------------------------------- links in messages

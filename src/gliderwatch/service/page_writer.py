@@ -17,6 +17,7 @@ from gliderwatch.health.battery import END
 from gliderwatch.health.rule import Limits
 from gliderwatch.health.rules import usual_limits
 from gliderwatch.params import Attention
+from gliderwatch.processes import NotBegun
 from gliderwatch.service.drawing import DrawingProcess
 
 if TYPE_CHECKING:
@@ -147,6 +148,7 @@ class PageWriter:
         self._job: Future[str] | None = None
         self._waiting: dict[str, None] = {}
         self._written: dict[str, float] = {}
+        self._again: set[str] = set()
 
     def use(self, config: Config) -> None:
         """Go by these settings; all pages are written once."""
@@ -196,9 +198,18 @@ class PageWriter:
 
     def _ended(self, job: PageJob, done: Future[str]) -> None:
         error = None if done.cancelled() else done.exception()
+        if isinstance(error, NotBegun) and job.glider not in self._again:
+            self._again.add(job.glider)  # once: the job may be what the process dies of
+            self._waiting.setdefault(job.glider)
+        else:
+            self._again.discard(job.glider)
+            self._tell(job, error, "" if error is not None or done.cancelled() else done.result())
+        self._news(PagesWritten())
+
+    @staticmethod
+    def _tell(job: PageJob, error: BaseException | None, of_maps: str) -> None:
         if error is not None:
             what = str(error) or type(error).__name__
             log.warning("pages not written", glider=job.glider or "all", folder=str(job.folder), reason=what)
-        elif not done.cancelled() and (reason := done.result()):
-            log.warning("map file cannot be used", reason=reason)
-        self._news(PagesWritten())
+        elif of_maps:
+            log.warning("map file cannot be used", reason=of_maps)

@@ -22,7 +22,7 @@ from gliderwatch.errors import GliderwatchError, NotAssessed, Retry
 from gliderwatch.model import Segment
 from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, Outcome, process
-from gliderwatch.processes import Workers
+from gliderwatch.processes import NotBegun, Workers
 from gliderwatch.sea.ocean_field import Field
 from gliderwatch.store.codec import encode_state
 from gliderwatch.store.segments import Plan
@@ -119,17 +119,17 @@ class RunWorkers:
             self._pool = None
 
 
+_FROM_OUTSIDE = (signal.SIGTERM, signal.SIGKILL, signal.SIGHUP)
+
+
 def why_not(error: BaseException) -> GliderwatchError:
     """Why a file could not be processed, from what its run ended with."""
     if isinstance(error, GliderwatchError):
         return error
     if isinstance(error, TimeoutError):
         return NotAssessed(f"cannot be assessed, please report it (took longer than {LIMIT:.0f} s)")
-    if isinstance(error, ProcessExpired) and -error.exitcode in (
-        signal.SIGTERM,
-        signal.SIGKILL,
-        signal.SIGHUP,
-    ):
+    killed = isinstance(error, ProcessExpired) and -error.exitcode in _FROM_OUTSIDE
+    if killed or isinstance(error, NotBegun):
         return Retry("the process that assessed it was ended from outside")
     return NotAssessed(f"cannot be assessed, please report it ({type(error).__name__}: {error})")
 

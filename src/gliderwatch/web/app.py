@@ -36,6 +36,7 @@ from gliderwatch.pages.fields import fields_of
 from gliderwatch.pages.reading import names_of, read_fleet
 from gliderwatch.pages.render import Frame
 from gliderwatch.pages.view import GliderView, worst_first
+from gliderwatch.processes import NotBegun
 from gliderwatch.service.drawing import DrawingProcess
 from gliderwatch.service.liveness import STALE, is_held, seconds_silent
 from gliderwatch.service.page_writer import battery_limits
@@ -109,12 +110,16 @@ class InProcess:
 
     async def __call__(self, work: Callable[[LiveJob], T], job: LiveJob) -> T:
         """What the work makes. Raises what it raises, or GliderwatchError where it is not done in time."""
-        making = self._process.begin(work, job, LIMIT, self._state)
-        try:
-            if making is not None:
+        for _ in range(2):
+            making = self._process.begin(work, job, LIMIT, self._state)
+            if making is None:
+                break
+            try:
                 return await asyncio.wrap_future(making)
-        except (TimeoutError, ProcessExpired):
-            pass
+            except NotBegun:
+                continue
+            except (TimeoutError, ProcessExpired):
+                break
         raise GliderwatchError(f"the page {job.file} could not be made in {LIMIT:g} s")
 
     def stop(self) -> None:
