@@ -10,6 +10,7 @@ from gliderwatch.messages.baseline import WORDINGS, usual
 from gliderwatch.messages.causes import DRAG, FLOW, HEAVY, TRIM, WING, Cause, likeliest
 from gliderwatch.messages.evidence import LINES, weigh
 from gliderwatch.model import Assessment, DiveFeatures, Kind
+from gliderwatch.navigation.dives import COMMANDED_USED, COURSE_ASSUMED
 from gliderwatch.navigation.features import evidence
 
 HEALTHY = {
@@ -38,6 +39,13 @@ def after(**changes: float) -> dict[str, float]:
 
 def slow(**changes: float) -> Assessment:
     return replace(SLOW, evidence=after(**changes), notes=())
+
+
+@pytest.mark.parametrize("note", [COMMANDED_USED, COURSE_ASSUMED])
+def test_where_no_heading_was_seen_a_glider_that_circles_is_named(note: str) -> None:
+    words = "its heading is not in the file: a glider that circles looks like a slow one"
+    assert words in weigh(replace(slow(roll_mean=-0.4), notes=(note,)), Kind.ANOMALY, WING)[1]
+    assert words not in weigh(slow(roll_mean=-0.4), Kind.ANOMALY, WING)[1]
 
 
 def test_each_number_of_the_baseline_has_words() -> None:

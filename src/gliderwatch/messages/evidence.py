@@ -25,6 +25,7 @@ from gliderwatch.messages.constants import (
 )
 from gliderwatch.messages.formatting import angle, clean, finite, speed
 from gliderwatch.model import Assessment, Kind
+from gliderwatch.navigation.dives import COMMANDED_USED, COURSE_ASSUMED
 
 # Bounds above (or below) which a number is worth a line; they change no flag.
 STRONG, MINOR = 3.0, 0.5  # what decides comes first, what is good to know last; others have 1
@@ -151,6 +152,9 @@ def _speeds(a: Assessment, cause: Cause) -> list[Remark]:
             # what a glider reports of itself does not know of a lost wing
             is_for = is_out != (cause is WING and name == "onboard_speed")
             found.append(Remark(is_for, text, STRONG if name == "along_speed" else 1.0))
+    if {COMMANDED_USED, COURSE_ASSUMED} & set(a.notes):
+        words = "its heading is not in the file: a glider that circles looks like a slow one"
+        found.append(Remark(False, words, 2.0))
     before, now = number(a, "speed_before"), finite(a.speed)
     if before is not None and out_of_range(a, now) and out_of_range(a, before):
         found.append(Remark(True, f"the dive before was out of range too: {speed(before)}"))

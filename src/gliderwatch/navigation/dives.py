@@ -121,6 +121,10 @@ def corrected_notes(step: float, surface: float) -> tuple[str, ...]:
     return tuple(notes)
 
 
+COMMANDED_USED = "commanded heading used, the measured one is not in the file"
+COURSE_ASSUMED = "headings missing: a steady course is assumed, in the direction that the current leaves"
+
+
 def flight_notes(flight: Flight, features: DiveFeatures) -> tuple[str, ...]:
     """What a reader of the assessment should know of the quality of a dive."""
     notes = []
@@ -131,9 +135,9 @@ def flight_notes(flight: Flight, features: DiveFeatures) -> tuple[str, ...]:
     if features.heading_reckoned:
         notes.append("no measured heading in the file: direction of the dead-reckoned way used")
     if features.heading_commanded:
-        notes.append("commanded heading used, the measured one is not in the file")
+        notes.append(COMMANDED_USED)
     if features.heading_assumed:
-        notes.append("headings missing: a steady course is assumed, in the direction that the current leaves")
+        notes.append(COURSE_ASSUMED)
     if features.heading_gap is not None:
         notes.append(f"no heading for {features.heading_gap / 3600:.1f} h of the dive: taken as steady")
     if features.unobserved:
