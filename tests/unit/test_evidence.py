@@ -158,6 +158,15 @@ def test_a_misfit_counts_beyond_four_standard_errors(misfit: float, sigma: float
     made = replace(DISAGREE, evidence={"across_misfit": misfit, "across_sigma": sigma})
     pro, _ = weigh(made, Kind.FALSE_ALARM, FLOW)
     assert any("the track misses" in line for line in pro) is wrong
+    assert likeliest(Kind.FALSE_ALARM, made).fact.startswith("the track misses") is wrong
+
+
+@pytest.mark.parametrize(
+    ("p_e", "fact"), [(0.4, "reckoned and estimated current are 0.58 m/s apart"), (0.1, "")]
+)
+def test_where_the_track_fits_the_currents_are_what_disagrees(p_e: float, fact: str) -> None:
+    made = replace(DISAGREE, p_e=p_e, evidence={"across_misfit": 0.02, "across_sigma": 0.02})
+    assert likeliest(Kind.FALSE_ALARM, made).fact == fact
 
 
 def test_not_a_number_is_left_out() -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import degrees
+from math import degrees, hypot
 
 from gliderwatch.estimation.modes import MODES
 from gliderwatch.estimation.modes import Cause as Explanation
 from gliderwatch.estimation.verdict import FASTER, NEW_FASTER, Blame
 from gliderwatch.messages.baseline import BaselineRemark, usual
-from gliderwatch.messages.constants import HIDDEN, ROLL_OF_ANY
+from gliderwatch.messages.constants import HIDDEN, MISFIT, ROLL_OF_ANY, SURE
 from gliderwatch.messages.formatting import angle, finite, speed
 from gliderwatch.model import Assessment, Kind
 
@@ -170,6 +170,18 @@ _SURE_REASONS: dict[str, Cause] = {
 """The cause that the estimator names itself."""
 
 
+def difference(assessment: Assessment) -> float | None:
+    """Length of the estimated current less the glider's (m/s), None where one of them is missing."""
+    a = assessment
+    u, v, ru, rv = (finite(x) for x in (a.flow_u, a.flow_v, a.reference_u, a.reference_v))
+    return None if u is None or v is None or ru is None or rv is None else hypot(u - ru, v - rv)
+
+
+def misfit_limit(a: Assessment) -> float:
+    """The misfit (m/s) that chance does not explain."""
+    return max(MISFIT, SURE * (finite(a.evidence.get("across_sigma")) or 0.0))
+
+
 def is_named(reason: str) -> bool:
     """Whether the words of the estimator are those of a cause or of the title, and need not be repeated."""
     return reason in _SURE_REASONS or reason in ("slower than normal", "faster than normal")
@@ -181,8 +193,13 @@ def _of_disagreement(a: Assessment) -> Likely:
     cause = _SURE_REASONS.get(a.reason)
     if cause is None and side is not None and sigma is not None and abs(side) > 3 * sigma:
         return Likely(COMPASS, f"it makes {100 * abs(side):.0f} % of its speed across its heading")
-    if across is not None and cause is not DRIVEN:
+    if cause is DRIVEN:
+        return Likely(cause, "")
+    if across is not None and abs(across) > misfit_limit(a):
         return Likely(cause or FLOW, f"the track misses by {speed(abs(across))} across the heading")
+    apart = difference(a)
+    if apart is not None and a.p_e is not None and a.p_e > a.gamma_f:
+        return Likely(cause or FLOW, f"reckoned and estimated current are {speed(apart)} apart")
     return Likely(cause or FLOW, "")
 
 

@@ -9,18 +9,16 @@ from typing import NamedTuple
 
 from gliderwatch.fleet.constants import DAC_NOISE, USUAL_SLIP
 from gliderwatch.messages.baseline import has_usual, usual
-from gliderwatch.messages.causes import WING, Cause
+from gliderwatch.messages.causes import WING, Cause, difference, misfit_limit
 from gliderwatch.messages.constants import (
     CERTAIN,
     DRIFT,
     FIX_GAP,
     LEARNT,
-    MISFIT,
     RATE_RATIO,
     ROLL_OF_ANY,
     SHORT_DIVE,
     STEADY,
-    SURE,
     UNOBSERVED,
 )
 from gliderwatch.messages.formatting import angle, clean, finite, speed
@@ -62,13 +60,6 @@ def normal_range(a: Assessment) -> str:
     if middle is not None and a.speed_max > LEARNT * middle:
         return f"normal above {a.speed_min:.2f}"
     return f"normal {a.speed_min:.2f}-{a.speed_max:.2f}"
-
-
-def difference(assessment: Assessment) -> float | None:
-    """Length of the estimated current less the glider's (m/s), None where one of them is missing."""
-    a = assessment
-    u, v, ru, rv = (finite(x) for x in (a.flow_u, a.flow_v, a.reference_u, a.reference_v))
-    return None if u is None or v is None or ru is None or rv is None else hypot(u - ru, v - rv)
 
 
 # ----------------------------------------
@@ -210,11 +201,6 @@ def through_water(own: float | None) -> float | None:
     0.23
     """
     return None if own is None else own * (1 - USUAL_SLIP)
-
-
-def misfit_limit(a: Assessment) -> float:
-    """The misfit (m/s) that chance does not explain."""
-    return max(MISFIT, SURE * (number(a, "across_sigma") or 0.0))
 
 
 # ----------------------------------------
