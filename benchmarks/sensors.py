@@ -1,11 +1,13 @@
 """Real missions with some of their sensors left out: what is still judged, and what is told of lost speed.
 
 python benchmarks/sensors.py [--missions ../shared/data] [--moments 6] [--workers 2] [--json out.json]
+                             [--tides rotary diurnal] [--seeds 3]
 
 For each mission and each set of sensors left out (`gliderwatch.score.sensors`): the part of dives that
 ended that is judged, and the messages about a healthy glider, of which all are false. Then half (x 0.5) or
 three tenths (x 0.7) of the speed are lost to drag from evenly spaced moments on; counted is what is told by
-an anomaly that opens within 2 and 4 surfacings, and in the end.
+an anomaly that opens within 2 and 4 surfacings, and in the end. With `--tides` each mission is flown in
+the tides of these kinds of sea (`tides.py`), once for each seed.
 """
 
 from __future__ import annotations
@@ -30,6 +32,7 @@ from gliderwatch.params import GliderParams
 from gliderwatch.pipeline import GliderState, process
 from gliderwatch.score.graft import Graft, GraftKind, grafted, navigate, own_speeds
 from gliderwatch.score.sensors import LEFT_OUT, is_sent, left_out
+from gliderwatch.score.tides import TIDAL, in_tide
 
 HOUR = 3600.0
 PARAMS = GliderParams()
@@ -59,6 +62,17 @@ class Drag:
     in_time: int
     told: int
     surfacings: float
+
+
+@dataclass(frozen=True)
+class Job:
+    """A mission to run without some sensors, in the tide of a ``sea`` (empty: none) of a seed."""
+
+    mission: Path
+    without: str
+    moments: int
+    sea: str = ""
+    seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -139,13 +153,15 @@ def _dragged(
     )
 
 
-def work(job: tuple[Path, str, int]) -> Row | None:
+def work(job: Job) -> Row | None:
     """One mission without some sensors; None where it never had them."""
-    mission, without, moments = job
-    segments = read(mission / "from-glider", mission / "cache")
-    if not is_sent(segments, LEFT_OUT[without]):
+    segments = read(job.mission / "from-glider", job.mission / "cache")
+    if not is_sent(segments, LEFT_OUT[job.without]):
         return None
-    return examined(mission.name, segments, without, moments)
+    if not job.sea:
+        return examined(job.mission.name, segments, job.without, job.moments)
+    name = f"{job.mission.name} {job.sea} {job.seed}"
+    return examined(name, in_tide(segments, job.sea, job.seed), job.without, job.moments)
 
 
 def shown(row: Row) -> str:
@@ -153,7 +169,7 @@ def shown(row: Row) -> str:
     drags = [f"{d.in_time:2d} {d.told:2d} of {d.moments:2d} {d.surfacings:4.0f}" for d in row.drags.values()]
     opened = ", ".join(f"{n} {kind}" for kind, n in sorted(row.opened.items())) or "-"
     return (
-        f"{row.mission:13s} {row.without:15s} {row.dives:4d} {100 * row.judged / max(row.dives, 1):4.0f}% "
+        f"{row.mission:28s} {row.without:15s} {row.dives:4d} {100 * row.judged / max(row.dives, 1):4.0f}% "
         f"{row.flags.get(1, 0):3d} {row.flags.get(2, 0):3d}  " + "  ".join(drags) + f"  {opened}"
     )
 
@@ -165,19 +181,23 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--only", nargs="*", help="these missions alone")
     parser.add_argument("--without", nargs="*", choices=list(LEFT_OUT), help="these sets of sensors alone")
+    parser.add_argument("--tides", nargs="*", choices=TIDAL, default=[], help="in these kinds of sea")
+    parser.add_argument("--seeds", type=int, default=1, help="tides of each kind")
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
     print(machine())
     missions = sorted(p for p in arguments.missions.iterdir() if (p / "from-glider").is_dir())
     jobs = [
-        (mission, without, arguments.moments)
+        Job(mission, without, arguments.moments, sea, seed)
         for mission in missions
         if arguments.only is None or mission.name in arguments.only
         for without in arguments.without or LEFT_OUT
+        for sea in arguments.tides or [""]
+        for seed in range(arguments.seeds if sea else 1)
     ]
     print("drags: told within 2 (x 0.5), 4 (x 0.7) surfacings, told at all, of moments, median surfacings")
     print(
-        f"{'mission':13s} {'left out':15s}  n   judged f1  f2  "
+        f"{'mission':28s} {'left out':15s}  n   judged f1  f2  "
         + "  ".join(f"{name:16s}" for name in DRAGS)
         + " incidents of the healthy glider"
     )

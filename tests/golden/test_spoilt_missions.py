@@ -5,13 +5,16 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gliderwatch.model import Alert, Segment, Series, readonly
 from gliderwatch.navigation.dives import Dive
+from gliderwatch.navigation.geodesy import velocity
 from gliderwatch.params import GliderParams
-from gliderwatch.score.graft import navigate
+from gliderwatch.score.graft import navigate, own_speeds
 from gliderwatch.score.sensors import LEFT_OUT, left_out
+from gliderwatch.score.tides import in_tide
 from gliderwatch.service.routing import Routing
 from gliderwatch.service.transaction import process_file
 from gliderwatch.store.database import MEMORY
@@ -75,6 +78,26 @@ def test_a_call_in_which_nothing_is_logged_hides_no_dive(shared_data):
     half = len(segments) // 2
     flags, alerts = judged([*segments[:half], *(later(s, 4 * HOUR) for s in segments[half:])])
     assert flags == [0] * len(dives) and alerts == []
+
+
+@pytest.mark.parametrize("heading", ["all sensors", "heading"])
+@pytest.mark.parametrize("sea", ["elliptic", "diurnal"])
+def test_in_the_tide_of_a_shelf_sea_a_mission_is_as_it_was(shared_data, sea, heading):
+    """Nothing is told of it, though its dives went over ground by up to 0.7 m/s otherwise."""
+    segments, dives = mission(shared_data, "maria-2022")
+    tidal = in_tide(segments, sea, seed=0)
+    moved = [velocity(d.start, d.end) - velocity(b.start, b.end) for b, d in both(dives, navigate(tidal))]
+    assert 0.2 < max(np.hypot(*each) for each in moved) < 1.0
+    through = [own_speeds(each) for each in (dives, navigate(tidal))]
+    assert through[1] == pytest.approx(through[0], abs=0.02)
+    flags, alerts = judged(left_out(tidal, LEFT_OUT[heading]))
+    assert flags == [0] * len(dives) and alerts == []
+
+
+def both(before, after):
+    """The dives that have two fixes, in pairs."""
+    assert [dive.t_dive for dive in before] == [dive.t_dive for dive in after]
+    return [(b, a) for b, a in zip(before, after, strict=True) if a.start and a.end]
 
 
 def test_days_without_gps_are_reported(shared_data):

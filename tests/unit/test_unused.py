@@ -14,6 +14,8 @@ ALLOWED = {
     "metropolis": "the consensus of paper 003, for comparison: benchmarks/fleet_field.py",
     "mean_variance": "J of paper 003; tests of the gradient look at it",
     "is_sent": "benchmarks/sensors.py asks which sensors a mission has",
+    "in_tide": "benchmarks/sensors.py flies missions in tides by it",
+    "TIDAL": "benchmarks/sensors.py offers these",
     "with_fault": "benchmarks/seas.py puts faults into missions by it",
     "Sent.computer": "rules of health read it next",
     "_Warnings.emit": "logging calls it",
