@@ -30,7 +30,7 @@ from gliderwatch.estimation.kalman import (
     learn_measurement_scale,
     learn_process_scale,
 )
-from gliderwatch.estimation.kinematic_speed import Ratios, kinematic_speed, vertical
+from gliderwatch.estimation.kinematic_speed import KinematicSpeed, Ratios, kinematic_speed, vertical
 from gliderwatch.estimation.kinematic_speed import learn as learn_ratios
 from gliderwatch.estimation.modes import MODES, Cause, switched
 from gliderwatch.estimation.speed_range import Drive, Normal, RangeParams, SpeedRange, speed_range
@@ -705,8 +705,21 @@ class TestSureness:
         _, flag, _ = verdict._slow_or_fast(SpeedState(rolled=2), info, None, normal, params)
         assert (flag is Flag.ANOMALY) == is_slow
 
-    @pytest.mark.parametrize(("sigma", "learns"), [(0.036, True), (0.039, False)])
-    def test_a_dive_whose_own_speed_is_sure_to_15_percent_tells_the_ratio_to_what_is_reported(
+    @pytest.mark.parametrize(("sigma", "by_rates"), [(0.036, False), (0.039, True)])
+    def test_where_the_fixes_leave_15_percent_open_depth_rate_and_pitch_tell_a_new_way(self, sigma, by_rates):
+        flatter = SimpleNamespace(features=DiveFeatures(duration=3 * HOUR, pitch_dive=-0.3, pitch_climb=0.3))
+        info = SimpleNamespace(estimate=SimpleNamespace(speed=0.25, own_sigma=sigma), kinematic_fits=True)
+        state = SpeedState(trim=(-0.45, 0.45, None, None))
+        rates = KinematicSpeed(0.2, 0.01, 0.01, is_prompt=True)
+        params = speed_params(GliderParams())
+        after, flag, _, _ = verdict._regime(
+            state, flatter, info, rates, SpeedRange(0.2, 0.25, 0.3, 20), Flag.NORMAL, "", params
+        )
+        assert bool(after.other) == by_rates
+        assert flag is Flag.NORMAL
+
+    @pytest.mark.parametrize(("sigma", "learns"), [(0.074, True), (0.076, False)])
+    def test_a_dive_whose_own_speed_is_sure_to_30_percent_tells_the_ratio_to_what_is_reported(
         self, sigma, learns
     ):
         flown = SimpleNamespace(

@@ -325,7 +325,9 @@ CLEARLY = 6.0
 TURNED = 0.785
 """rad: by how much the glider must have turned before the two can differ: 45 degrees."""
 OWN_SURE = 0.15
-"""Standard error of W on a dive, as part of it, up to which the dive tells what W is to what is reported."""
+"""Standard error of W on a dive, as part of the usual speed, above which the fixes hardly tell the speed,"""
+RATIO_SURE = 0.3
+"""and as part of W, up to which the dive tells what W is to what is reported: a median of them counts."""
 ROLL_STEP = 0.12
 """rad: a step of the mean roll that speaks for a lost or bent wing. Healthy gliders roll within 0.05."""
 ROLL_LOST = 0.19

@@ -25,6 +25,7 @@ from gliderwatch.estimation.constants import (
     LEAST_ACROSS,
     MISFITS_KEPT,
     OWN_SURE,
+    RATIO_SURE,
     RETRIMMED,
     ROLL_CONFIRMS,
     ROLL_LOST,
@@ -479,7 +480,7 @@ def _learnt(
     if roll is not None and len(rolls) < 3 * BASELINE_LEAST:
         rolls = (*rolls, roll)
     own = info.seen.own_speed()
-    if own is not None and own[1] < (2 if info.seen.is_free else 1) * OWN_SURE * own[0]:
+    if own is not None and own[1] < RATIO_SURE * own[0]:
         ratios = learn_ratios(ratios, dive.features, own[0])
     # where a surfacing was not seen several dives are one, perhaps the short ones of a launch
     is_low = normal.dives and info.estimate.speed < normal.low
