@@ -7,6 +7,7 @@ import pytest
 from dives_by_letters import HOUR, STEP, Talk, World, dive
 from gliderwatch.incidents.constants import NEWS, SETTLES
 from gliderwatch.incidents.notifications import NotificationState, settled_changes
+from gliderwatch.incidents.overdue import ExpectedCall, Silence
 from gliderwatch.model import Kind, NextSurfacing, Severity, Unusable
 
 
@@ -63,6 +64,25 @@ class TestReminders:
         kinds = {n: talk.update("0" + "1" * n) for n in range(2, 40)}
         reminded = [n for n, notified in kinds.items() if notified == ["reminder"]]
         assert kinds[2] == ["anomaly"] and reminded == [10, 18, 34]  # after 1, 2 and 4 days of 8 dives
+
+    @pytest.mark.parametrize(
+        ("messages", "called", "reminded"),
+        [
+            (3, 6.0 * HOUR, [18, 34]),
+            (2, 6.0 * HOUR, [10, 18, 34]),
+            (3, None, [10, 18, 34]),
+            (3, 1.0 * HOUR, [10, 18, 34]),
+        ],
+    )
+    def test_that_of_a_day_was_the_reminder_of_the_silence_in_which_it_began(
+        self, messages, called, reminded
+    ):
+        """A net holds a glider down for half a day: it is overdue, and slow when it has come up."""
+        talk, missed = Talk(reminder_hours=24.0), ExpectedCall(0.0, 2.0 * HOUR, 3.0 * HOUR, STEP)
+        silence = Silence("electa/overdue/0", missed, 2, messages, called)
+        talk.notified = replace(talk.notified, silences=(silence,))
+        kinds = {n: talk.update("0" + "1" * n) for n in range(2, 40)}
+        assert [n for n, notified in kinds.items() if notified == ["reminder"]] == reminded
 
     def test_none_when_switched_off(self):
         talk = Talk(reminder_hours=None)

@@ -102,6 +102,8 @@ MARKS = (1.0, 2.0, 4.0, 7.0)
 """Days after which people are reminded of an open incident,"""
 WEEK = 7.0
 """and then each time after so many days."""
+REMINDED = 3
+"""Messages of a silence that is over: with so many people were reminded of it."""
 SLACK = 0.2
 """Of a day: so much sooner a reminder may come; surfacings do not fall on full days."""
 

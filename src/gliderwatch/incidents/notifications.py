@@ -11,7 +11,15 @@ from gliderwatch.fleet.advice import Advice
 from gliderwatch.incidents.aborts import Episode
 from gliderwatch.incidents.acknowledgement import Acks
 from gliderwatch.incidents.calls import CallsWithoutFile
-from gliderwatch.incidents.constants import BACK, FLOW_CHANGE, NEWS, REGIME_DIVES, SETTLES, SPEED_CHANGE
+from gliderwatch.incidents.constants import (
+    BACK,
+    FLOW_CHANGE,
+    NEWS,
+    REGIME_DIVES,
+    REMINDED,
+    SETTLES,
+    SPEED_CHANGE,
+)
 from gliderwatch.incidents.facts import Facts, last_dives, next_surfacing, situation
 from gliderwatch.incidents.health import HealthThread
 from gliderwatch.incidents.neighbours import Comparison
@@ -116,7 +124,8 @@ def due_notifications(
     if latest is None:
         return notified, []
     health = tuple(t.reported for t in notified.health if not t.is_over)
-    moment = _Moment(facts, latest, max(now, latest.t_surface), reminder_hours, acks, health)
+    at, silences = max(now, latest.t_surface), notified.silences
+    moment = _Moment(facts, latest, at, reminder_hours, acks, health, silences)
     threads, alerts, settles = _of_incidents(notified.threads, moment)
     renewed, more = _new_regime(notified.renewed, facts, latest)
     alerts += more
@@ -145,8 +154,8 @@ def settled_changes(
 
 @dataclass(frozen=True, slots=True)
 class _Moment:
-    """What decides on the messages that are due: the ``latest`` dive, the time ``now`` (s), and what rules of
-    ``health`` found that goes on."""
+    """What decides on the messages that are due: the ``latest`` dive, the time ``now`` (s), what rules of
+    ``health`` found that goes on, and the messages of ``silences``."""
 
     facts: IncidentFacts
     latest: Assessment
@@ -154,6 +163,7 @@ class _Moment:
     reminder_hours: float | None
     acks: Acks
     health: tuple[HealthIncident, ...] = ()
+    silences: tuple[Silence, ...] = ()
 
 
 def _of_incidents(
@@ -358,10 +368,26 @@ def _continued(thread: Thread, now: Incident | None, moment: _Moment) -> tuple[T
         content = Corrected(thread.reported, now, dive, _why(thread, dive), situation(facts, now.id))
         return _message(thread, content, moment)
     is_quiet = now.cleared_at is not None or holds_acknowledgement(thread, now, moment.acks)
-    if not is_quiet and is_reminder_due(now.opened_at, thread.time, latest.t_surface, moment.reminder_hours):
+    last = _last_word(thread, now, moment)
+    if not is_quiet and is_reminder_due(now.opened_at, last, latest.t_surface, moment.reminder_hours):
         hours = (latest.t_surface - now.since) / 3600
         return _message(thread, StillOpen(now, latest, hours, _what_goes_on(now, moment)), moment)
     return thread, []
+
+
+def _last_word(thread: Thread, now: Incident, moment: _Moment) -> float:
+    """When people were last told of an incident (s). One that began in a silence of which they were reminded
+    has had its first reminder by that."""
+    told = any(
+        s.messages >= REMINDED
+        and s.called is not None
+        and s.missed.last_sign <= now.opened_at
+        and now.since <= s.called
+        for s in moment.silences
+    )
+    if thread.messages > 1 or moment.reminder_hours is None or not told:
+        return thread.time
+    return max(thread.time, now.opened_at + 3600 * moment.reminder_hours)
 
 
 def _changed(reported: Assessment, now: Assessment) -> bool:
