@@ -206,6 +206,17 @@ class TestCorrections:
         assert talk.update(world) == ["anomaly"]
         assert len(talk.notified.threads) == 2
 
+    def test_one_whose_dives_are_judged_otherwise_as_the_next_one_is_slow_is_the_same(self):
+        """A net takes hold in the middle of a dive: the final current says that its track fits nothing."""
+        talk, world = Talk(), World.of("0S")
+        assert talk.update(world) == ["anomaly"]
+        self.change(world, 1, flag=2)
+        world.dives[2 * STEP] = dive(2, "S")
+        assert talk.update(world) == ["anomaly"]
+        said = " ".join(talk.alerts[-1].body.split())
+        assert "The anomaly since 1970-01-01 03:00 UTC is this one: its dives are judged otherwise" in said
+        assert len(talk.notified.threads) == 1
+
     def test_two_incidents_that_turn_out_to_be_one(self):
         talk, world = Talk(), World.of("0110011")
         assert talk.update(world) == ["anomaly"]

@@ -180,7 +180,7 @@ def _of_incidents(
     for thread in before:
         incident = matched.get(thread.id)
         if opened is not None and thread.is_open and (incident is None or incident.cleared_at is not None):
-            after, more = _opened(thread, opened, [*over, thread.reported], moment)
+            after, more = _opened(thread, opened, [*over, incident or thread.reported], moment)
             opened, over = None, []
         else:
             after, more = _continued(thread, incident, moment)

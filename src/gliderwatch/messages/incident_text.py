@@ -76,6 +76,8 @@ def _instead(incident: Incident, before: Incident | None) -> str:
     if before is None:
         return ""
     reported = f" The {_name(before)} since {utc(before.since)}"
+    if before.kind is incident.kind and before.cleared_at is None:
+        return f"{reported} is this one: its dives are judged otherwise by what has come since."
     if before.kind is incident.kind:
         return f"{reported} is over: this is another."
     if incident.kind is Kind.FALSE_ALARM:
