@@ -18,7 +18,7 @@ from gliderwatch.messages.health_text import blocks
 from gliderwatch.messages.notice_text import render
 from gliderwatch.model import Fix, Incident, Kind, Severity
 
-T0, HOUR = 1.7e9, 3600.0
+T0, HOUR, DAY = 1.7e9, 3600.0, 86400.0
 Row = tuple[float, dict[str, Finding | None]]
 
 
@@ -74,6 +74,26 @@ def test_comes_again_in_a_thread_of_its_own() -> None:
     found = notices(again)
     assert [type(n.content) for n in found] == [HealthFound, HealthOver, HealthFound]
     assert found[0].thread != found[2].thread
+
+
+@pytest.mark.parametrize(("days", "together"), [(6.5, True), (7.5, False)])
+def test_what_is_back_within_a_week_of_its_end_is_over_after_a_week_without(
+    days: float, together: bool
+) -> None:
+    """A vacuum of 6.00 inHg for a month: five incidents in two weeks told a pilot nothing."""
+    quiet = [None] * round(8 * days)
+    found = notices(rows(W, *[None] * 4, W, *quiet, W, *[None] * 60))
+    more = [HealthReminder, HealthOver] if together else [HealthOver, HealthFound, HealthOver]
+    assert [type(n.content) for n in found] == [HealthFound, HealthOver, HealthFound, *more]
+    over = next(n for n in found[3:] if type(n.content) is HealthOver)
+    assert over.time - found[2].time == ((days * together + 7) * DAY + 3 * HOUR * together)
+
+
+@pytest.mark.parametrize(("days", "is_back"), [(6.5, True), (7.5, False)])
+def test_what_comes_a_week_after_its_end_is_over_as_the_first_was(days: float, is_back: bool) -> None:
+    found = notices(rows(W, *[None] * (4 + round(8 * days) - 1), W, *[None] * 60))
+    assert [type(n.content) for n in found] == [HealthFound, HealthOver, HealthFound, HealthOver]
+    assert found[3].time - found[2].time == (7 * DAY if is_back else 12 * HOUR)
 
 
 def test_row_in_which_a_rule_has_nothing_to_look_at_says_nothing() -> None:

@@ -115,5 +115,8 @@ LAST_CALLS = 10
 CLEAR_AFTER = 4
 """Segments or calls in a row in which a rule finds nothing that clear its incident: the file and the log of
 two surfacings. One that is at its limit is not reported again at each."""
+RELAPSE = 7 * DAY
+"""Seconds after the end of an incident within which another of its rule is over only after so long without a
+finding: a value that stays about its limit for weeks is two incidents, not one every other day."""
 CLEAR_TREND_AFTER = 16
 """The same of a trend, whose error varies: two days of files (measured: with 4 two of ten came twice)."""

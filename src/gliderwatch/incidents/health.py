@@ -7,11 +7,11 @@ and what people have been notified of, as for all incidents.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from gliderwatch.health.attitude import ROLL
-from gliderwatch.health.constants import REMEMBERED
+from gliderwatch.health.constants import DAY, RELAPSE, REMEMBERED
 from gliderwatch.health.rule import Finding
 from gliderwatch.health.rules import RULES, Judged
 from gliderwatch.incidents.acknowledgement import Acks, is_acknowledged
@@ -33,6 +33,7 @@ from gliderwatch.model import Fix, Incident, Kind, Severity
 def health_incidents(glider: str, rows: Iterable[tuple[float, Judged]]) -> tuple[HealthIncident, ...]:
     """The incidents of a glider by what the rules found in its segments and calls, in order of time (s)."""
     done: list[HealthIncident] = []
+    over: dict[str, float] = {}
     open_: dict[str, list[tuple[float, Finding]]] = {}
     normal: dict[str, int] = {}
     needed = {rule.name: rule.clear_after for rule in RULES}
@@ -43,13 +44,21 @@ def health_incidents(glider: str, rows: Iterable[tuple[float, Judged]]) -> tuple
                 continue  # nothing is open, nothing opens: as nearly always
             phase = Phase.OK if before is None else Phase.OPEN
             normal[rule] = 0 if finding is not None else normal[rule] + 1
-            after = TRANSITIONS[phase, _event(phase, finding, normal[rule] >= needed.get(rule, 1))]
+            rests = before is None or not _is_back(before, over.get(rule)) or t - before[-1][0] >= RELAPSE
+            is_normal = rests and normal[rule] >= needed.get(rule, 1)
+            after = TRANSITIONS[phase, _event(phase, finding, is_normal)]
             if finding is not None:
                 open_.setdefault(rule, []).append((t, finding))
             elif after is Phase.OK:
                 done.append(_incident(glider, open_.pop(rule), cleared_at=t))
+                over[rule] = t
     still = (_incident(glider, found, None) for found in open_.values())
     return tuple(sorted((*done, *still), key=lambda i: (i.opened_at, i.id)))
+
+
+def _is_back(found: Sequence[tuple[float, Finding]], over: float | None) -> bool:
+    """Whether what was found first in a segment or call was over a short time (s) before."""
+    return over is not None and found[0][0] - over < RELAPSE
 
 
 def _event(phase: Phase, finding: Finding | None, is_normal: bool) -> Event:
@@ -89,11 +98,12 @@ class HealthThread:
 
 @dataclass(frozen=True, slots=True)
 class _Now:
-    """What decides on the notices that are due: the ``latest`` reading (s), the last fix, acks, and the
-    ``rolling`` anomalies of dives. The reminders of dives at a severity of ``reminded`` (None: there are
-    none) name what is open of health as well."""
+    """What decides on the notices that are due: the ``latest`` reading (s), when each rule found something
+    last (``found_at``, s), the last fix, acks, and the ``rolling`` anomalies of dives. The reminders of dives
+    at a severity of ``reminded`` (None: there are none) name what is open of health as well."""
 
     latest: float
+    found_at: Mapping[str, float]
     fix: Fix | None
     acks: Acks
     reminder_hours: float | None
@@ -135,7 +145,8 @@ def announce(
     if not rows:
         return before, []
     rolling = tuple(i for i in anomalies if i.kind is Kind.ANOMALY and (i.worst.rolls or i.last.rolls))
-    now = _Now(rows[-1][0], fix, acks, reminder_hours, rolling, reminded)
+    found_at = {rule: t for t, judged in rows for rule, each in judged.items() if each is not None}
+    now = _Now(rows[-1][0], found_at, fix, acks, reminder_hours, rolling, reminded)
     incidents = health_incidents(glider, rows)
     matched = _matched(before, incidents)
     threads, notices = list[HealthThread](), list[Notice]()
@@ -199,7 +210,10 @@ def _continued(
         thread, notices = _notified(thread, incident, HealthFound(incident, not thread.is_over, now.fix), now)
         return replace(thread, is_over=False), notices
     is_acked = is_acknowledged(now.acks, (incident.id, thread.id), incident.severity)
-    is_wanted = not is_acked and not now.is_named(incident)
+    is_so = (
+        now.latest - now.found_at.get(incident.rule, now.latest) < DAY
+    )  # one that is back stays open longer
+    is_wanted = is_so and not is_acked and not now.is_named(incident)
     if is_wanted and is_reminder_due(incident.opened_at, thread.time, now.latest, now.reminder_hours):
         reminder = HealthReminder(incident, (now.latest - incident.since) / 3600, now.fix)
         return _notified(thread, incident, reminder, now)
