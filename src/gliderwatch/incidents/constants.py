@@ -86,7 +86,7 @@ THINNED = 7.0
 """then each time after so many of them: once a week where they are daily."""
 
 # When an incident opens, and is over
-WELL = 0.3
+WELL = 0.5
 """Part of the way from the lower bound to the usual speed from which an open anomaly is over."""
 SURELY = 2.0
 """Standard errors by which a speed must be below normal for one dive alone to be severe,"""
