@@ -7,7 +7,7 @@ For each mission and each set of sensors left out (`gliderwatch.score.sensors`):
 ended that is judged, and the messages about a healthy glider, of which all are false. Then half (x 0.5) or
 three tenths (x 0.7) of the speed are lost to drag from evenly spaced moments on; counted is what is told by
 an anomaly that opens within 2 and 4 surfacings, and in the end. With `--tides` each mission is flown in
-the tides of these kinds of sea (`tides.py`), once for each seed.
+the tides of these kinds of sea (`gliderwatch.score.tides`), once for each seed.
 """
 
 from __future__ import annotations

@@ -80,7 +80,7 @@ def test_comes_again_in_a_thread_of_its_own() -> None:
 def test_what_is_back_within_a_week_of_its_end_is_over_after_a_week_without(
     days: float, together: bool
 ) -> None:
-    """A vacuum of 6.00 inHg for a month: five incidents in two weeks told a pilot nothing."""
+    """A vacuum of 6.00 inHg: four incidents in 15 days told a pilot nothing."""
     quiet = [None] * round(8 * days)
     found = notices(rows(W, *[None] * 4, W, *quiet, W, *[None] * 60))
     more = [HealthReminder, HealthOver] if together else [HealthOver, HealthFound, HealthOver]

@@ -7,7 +7,7 @@ and what people have been notified of, as for all incidents.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from gliderwatch.health.attitude import ROLL
@@ -44,8 +44,9 @@ def health_incidents(glider: str, rows: Iterable[tuple[float, Judged]]) -> tuple
                 continue  # nothing is open, nothing opens: as nearly always
             phase = Phase.OK if before is None else Phase.OPEN
             normal[rule] = 0 if finding is not None else normal[rule] + 1
-            rests = before is None or not _is_back(before, over.get(rule)) or t - before[-1][0] >= RELAPSE
-            is_normal = rests and normal[rule] >= needed.get(rule, 1)
+            is_normal = normal[rule] >= needed.get(rule, 1)
+            if before is not None and _is_back(before, over.get(rule)):
+                is_normal = is_normal and t - before[-1][0] >= RELAPSE
             after = TRANSITIONS[phase, _event(phase, finding, is_normal)]
             if finding is not None:
                 open_.setdefault(rule, []).append((t, finding))
@@ -98,17 +99,25 @@ class HealthThread:
 
 @dataclass(frozen=True, slots=True)
 class _Now:
-    """What decides on the notices that are due: the ``latest`` reading (s), when each rule found something
-    last (``found_at``, s), the last fix, acks, and the ``rolling`` anomalies of dives. The reminders of dives
-    at a severity of ``reminded`` (None: there are none) name what is open of health as well."""
+    """What decides on the notices that are due: what the rules found (``rows``, not none), the last fix,
+    acks, and the ``rolling`` anomalies of dives. The reminders of dives at a severity of ``reminded`` (None:
+    there are none) name what is open of health as well."""
 
-    latest: float
-    found_at: Mapping[str, float]
+    rows: Sequence[tuple[float, Judged]]
     fix: Fix | None
     acks: Acks
     reminder_hours: float | None
     rolling: tuple[Incident, ...]
     reminded: Severity | None
+
+    @property
+    def latest(self) -> float:
+        """The latest reading (s)."""
+        return self.rows[-1][0]
+
+    def is_so(self, rule: str) -> bool:
+        """Whether a rule found something within a day: what is back stays open for longer."""
+        return any(judged.get(rule) is not None for t, judged in self.rows if self.latest - t < DAY)
 
     def is_named(self, incident: HealthIncident) -> bool:
         """Whether the reminders of an incident of dives are its reminders: one fault has one row of them."""
@@ -145,8 +154,7 @@ def announce(
     if not rows:
         return before, []
     rolling = tuple(i for i in anomalies if i.kind is Kind.ANOMALY and (i.worst.rolls or i.last.rolls))
-    found_at = {rule: t for t, judged in rows for rule, each in judged.items() if each is not None}
-    now = _Now(rows[-1][0], found_at, fix, acks, reminder_hours, rolling, reminded)
+    now = _Now(rows, fix, acks, reminder_hours, rolling, reminded)
     incidents = health_incidents(glider, rows)
     matched = _matched(before, incidents)
     threads, notices = list[HealthThread](), list[Notice]()
@@ -210,11 +218,9 @@ def _continued(
         thread, notices = _notified(thread, incident, HealthFound(incident, not thread.is_over, now.fix), now)
         return replace(thread, is_over=False), notices
     is_acked = is_acknowledged(now.acks, (incident.id, thread.id), incident.severity)
-    is_so = (
-        now.latest - now.found_at.get(incident.rule, now.latest) < DAY
-    )  # one that is back stays open longer
-    is_wanted = is_so and not is_acked and not now.is_named(incident)
-    if is_wanted and is_reminder_due(incident.opened_at, thread.time, now.latest, now.reminder_hours):
+    is_wanted = not is_acked and not now.is_named(incident)
+    is_late = is_reminder_due(incident.opened_at, thread.time, now.latest, now.reminder_hours)
+    if is_wanted and is_late and now.is_so(incident.rule):
         reminder = HealthReminder(incident, (now.latest - incident.since) / 3600, now.fix)
         return _notified(thread, incident, reminder, now)
     return replace(thread, reported=incident), []

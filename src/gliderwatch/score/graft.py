@@ -14,6 +14,7 @@ from itertools import pairwise
 from math import inf
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gliderwatch.model import Array, Dive, Segment, Series, readonly
 from gliderwatch.navigation.dives import Navigation, extend
@@ -26,6 +27,8 @@ _SLOWED = ("speed_onboard", "depth_rate", "depth")
 _SURFACE = 5.0
 """Metres: where a glider counts as at the surface stays where it is."""
 _LEG = 20e3
+_EARLY = 120.0
+"""s: a current that comes so long before the last sample of a dive is of that dive too."""
 
 
 class GraftKind(StrEnum):
@@ -84,6 +87,15 @@ def grafted(
         if graft.kind is GraftKind.SLOWED
         else _wrong(dives, graft.size, onset)
     )
+    return changed(segments, change)
+
+
+Change = Callable[[Segment, float], Mapping[str, Series]]
+"""The quantities that a segment has after it, by the segment and its declination (rad)."""
+
+
+def changed(segments: Iterable[Segment], change: Change) -> list[Segment]:
+    """The segments, in the order of time, after a change; one without a declination has that before it."""
     declination, out = 0.0, []
     for segment in segments:
         declination = segment.declination if segment.declination is not None else declination
@@ -91,10 +103,49 @@ def grafted(
     return out
 
 
-_Change = Callable[[Segment, float], Mapping[str, Series]]
+def moved(segment: Segment, name: str, way: Callable[[Series], Array]) -> dict[str, Series]:
+    """The positions ``name`` (`fix`, `dr`) of a segment after the ``way`` (m, (n, 2): east, north) of their
+    latitudes; none where it has none. One too far for a plane is moved in legs."""
+    lat, lon = segment.get(f"{name}_lat"), segment.get(f"{name}_lon")
+    if not len(lat) or len(lat) != len(lon):
+        return {}
+    places = [_from(*place) for place in zip(lat.v.tolist(), lon.v.tolist(), way(lat), strict=True)]
+    north, east = zip(*places, strict=True)
+    return {f"{name}_lat": Series(lat.t, readonly(north)), f"{name}_lon": Series(lon.t, readonly(east))}
 
 
-def _slowed(dives: Sequence[Dive], size: float, during: tuple[float, float], usual: float) -> _Change:
+def _from(lat: float, lon: float, way: Array) -> tuple[float, float]:
+    legs = 1 + int(np.hypot(*way) / _LEG)
+    for _ in range(legs):
+        lat, lon = from_plane(way / legs, lat, lon)
+    return lat, lon
+
+
+def along(t: Array, way: Array, at: Array) -> Array:
+    """The way (m, (n, 2)) at times ``at`` (s), of which the ``way`` at times ``t`` is known."""
+    return np.stack([np.interp(at, t, way[:, 0]), np.interp(at, t, way[:, 1])], axis=-1)
+
+
+def with_error(segment: Segment, declination: float, error: Callable[[Array], Array]) -> dict[str, Series]:
+    """The currents of a segment with an ``error`` (m/s, (n, 2): east, north) by their times (s). Zeros, which
+    stand for none, stay."""
+    found = {}
+    for name in _CURRENTS:
+        x, y = segment.get(f"{name}_x"), segment.get(f"{name}_y")
+        if len(x) and len(x) == len(y):
+            none = (x.v == 0) & (y.v == 0)
+            more = magnetic_to_true(np.where(none[:, None], 0.0, error(x.t)), -declination)
+            found[f"{name}_x"] = Series(x.t, readonly(x.v + more[:, 0]))
+            found[f"{name}_y"] = Series(y.t, readonly(y.v + more[:, 1]))
+    return found
+
+
+def last_ended(ends: Array, t: Array | float) -> NDArray[np.intp]:
+    """Of dives that end so (s), the one that a current reported at a time (s) is of; -1: of none."""
+    return np.asarray(np.searchsorted(ends, np.asarray(t) + _EARLY) - 1)
+
+
+def _slowed(dives: Sequence[Dive], size: float, during: tuple[float, float], usual: float) -> Change:
     """Takes a part of the way through the water out of all positions, and of speeds and depths."""
     onset, end = during
     t, lost = lost_way(dives, size, onset, usual, end)
@@ -108,10 +159,7 @@ def _slowed(dives: Sequence[Dive], size: float, during: tuple[float, float], usu
                 at, readonly(np.where((at < onset) | (at >= end), v, kept + (1.0 - size) * (v - kept)))
             )
         for name in _POSITIONS:
-            lat, lon = segment.get(f"{name}_lat"), segment.get(f"{name}_lon")
-            if len(lat) and len(lat) == len(lon):
-                places = _moved(lat, lon, t, lost)
-                out |= {f"{name}_lat": Series(lat.t, places[0]), f"{name}_lon": Series(lon.t, places[1])}
+            out |= moved(segment, name, lambda lat: -along(t, lost, lat.t))
         return out
 
     return change
@@ -133,43 +181,22 @@ def lost_way(
     return np.array(times), np.cumsum(steps, axis=0)
 
 
-def _moved(lat: Series, lon: Series, t: Array, lost: Array) -> tuple[Array, Array]:
-    """Positions (degrees) moved back by the way lost; one too far for a plane is moved in legs."""
-    way = np.stack([np.interp(lat.t, t, lost[:, 0]), np.interp(lat.t, t, lost[:, 1])], axis=-1)
-    places = [_back(*place) for place in zip(lat.v.tolist(), lon.v.tolist(), way, strict=True)]
-    return readonly([p[0] for p in places]), readonly([p[1] for p in places])
-
-
-def _back(lat: float, lon: float, way: Array) -> tuple[float, float]:
-    legs = 1 + int(np.hypot(*way) / _LEG)
-    for _ in range(legs):
-        lat, lon = from_plane(-way / legs, lat, lon)
-    return lat, lon
-
-
-def _wrong(dives: Sequence[Dive], size: float, onset: float) -> _Change:
+def _wrong(dives: Sequence[Dive], size: float, onset: float) -> Change:
     """Adds to each reported current an error to the left of the dive that it is about."""
     ends = np.array([dive.t_surface for dive in dives])
 
+    def error(at: Array) -> Array:
+        return np.array([_error(dives, ends, t, size, onset) for t in at.tolist()])
+
     def change(segment: Segment, declination: float) -> Mapping[str, Series]:
-        out = dict(segment.quantities)
-        for name in _CURRENTS:
-            x, y = segment.get(f"{name}_x"), segment.get(f"{name}_y")
-            if not len(x) or len(x) != len(y):
-                continue
-            error = np.array([_error(dives, ends, t, size, onset) for t in x.t.tolist()])
-            error[(x.v == 0) & (y.v == 0)] = 0.0
-            error = magnetic_to_true(error, -declination)
-            out[f"{name}_x"] = Series(x.t, readonly(x.v + error[:, 0]))
-            out[f"{name}_y"] = Series(y.t, readonly(y.v + error[:, 1]))
-        return out
+        return {**segment.quantities, **with_error(segment, declination, error)}
 
     return change
 
 
 def _error(dives: Sequence[Dive], ends: Array, t: float, size: float, onset: float) -> Array:
     """The error (m/s: east, north) of what is reported at ``t`` (s) of the dive that ended last."""
-    i = int(np.searchsorted(ends, t + 120.0)) - 1
+    i = int(last_ended(ends, t))
     if i < 0 or ends[i] < onset:
         return np.zeros(2)
     track = dives[i].track

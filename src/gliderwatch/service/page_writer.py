@@ -201,15 +201,12 @@ class PageWriter:
         if isinstance(error, NotBegun) and job.glider not in self._again:
             self._again.add(job.glider)  # once: the job may be what the process dies of
             self._waiting.setdefault(job.glider)
-        else:
-            self._again.discard(job.glider)
-            self._tell(job, error, "" if error is not None or done.cancelled() else done.result())
-        self._news(PagesWritten())
-
-    @staticmethod
-    def _tell(job: PageJob, error: BaseException | None, of_maps: str) -> None:
+            self._news(PagesWritten())
+            return
+        self._again.discard(job.glider)
         if error is not None:
             what = str(error) or type(error).__name__
             log.warning("pages not written", glider=job.glider or "all", folder=str(job.folder), reason=what)
-        elif of_maps:
-            log.warning("map file cannot be used", reason=of_maps)
+        elif not done.cancelled() and (reason := done.result()):
+            log.warning("map file cannot be used", reason=reason)
+        self._news(PagesWritten())
